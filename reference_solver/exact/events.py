@@ -78,9 +78,9 @@ class Monitors:
     """What must not fall below zero while a piece lasts.
 
     For each of m contacts: ``width`` margins of its features [m], how fast it slips in its direction at the start of
-    the piece [m/s], its load and the friction that it could still bear [N]; infinite where there is none. Of a corner on
-    a face in space also the heights of its body's other corners over the face [m]: where one falls below it beyond its
-    end, an edge has come down on the end.
+    the piece [m/s], its load and the friction that it could still bear [N]; infinite where there is none. Of a corner
+    on a face in space also the heights of its body's other corners over the face [m]: where one falls below it beyond
+    its end, an edge has come down on the end.
 
     Parameters
     ----------

@@ -2,6 +2,7 @@
 
 import copy
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -113,6 +114,16 @@ def test_kind_of_an_event_at_the_start_of_a_piece():
     piece = constant(world, state, decide(world, state, contacts, free), 1.0)
     event = events.first_event(world, piece, after_instant=False)
     assert event.at_start and event.kind is events.Kind.FEATURE and event.ended == set(contacts.names)
+
+
+def test_reasons_why_pieces_end():
+    """A ball that slides on a box rolls, and comes to its edge."""
+    world = world_of(model := replace(on_a_box(2, 1.0, 3.0, 0.0), friction=np.full((2, 2), 0.5)))
+    moving, why = Loop(world, start_of(model), 1e-11, 10.0 * world.time), []
+    for _ in range(2):
+        moving.next_piece()
+        why.append(moving.ends)
+    assert why == [events.Kind.SLIDE, events.Kind.FEATURE]
 
 
 def falling_ball(e):
