@@ -274,6 +274,65 @@ def test_ball_between_closing_walls(closing, steps):
     assert abs(found.pose[-1, 2, 0] - float(x + v * (end - now))) < SMALL
 
 
+@pytest.mark.parametrize("along", [False, True])
+def test_ball_in_a_groove_with_a_slow_side(along):
+    """It stays on both sides. They brake its spin with mu r (N_1 + N_2) = mu r sqrt(2) m g / (1 + mu^2)."""
+    radius, mu, half = 0.5, 0.3, math.sqrt(0.5)
+    slow = 1e-3 * half * np.array((-1.0, -1.0) if along else (-1.0, 1.0))  # of the right side, along it or outwards
+    sides = [
+        Body(HalfSpace((half, half)), motion="fixed"),
+        Body(HalfSpace((-half, half)), twist=(*slow, 0.0), motion="prescribed"),
+    ]
+    place, velocity = np.array((0.0, radius / half)), np.array((0.0, 0.0)) if along else slow
+    model = Model(2, [*sides, ball(2, place, velocity, spin=(20.0,))], (0.0, -G), 0.0, mu)
+    found = certify(model, Settings.reference(DT), 120)
+    assert found.holds
+    rate = 2.0 * math.sqrt(2.0) * mu * G / (radius * (1.0 + mu * mu))
+    angle = 20.0 * found.t - 0.5 * rate * found.t**2
+    truth = np.column_stack([place + velocity * found.t[:, None], angle])
+    assert np.abs(found.pose[:, 2] - truth).max() < SMALL
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_row_of_capsules_and_a_box_that_collapses(d):
+    """If e < 7 - 4 sqrt(3), three equal bodies never cease to collide: they go on together, with the mean velocity."""
+    half, radius, aside = 0.3, 0.2, (0.0,) * (d - 1)
+    rod, block = Capsule(half, radius), Box((0.4,) * d)
+    moment = 0.1 if d == 2 else (0.1,) * 3
+    spins = (0.0,) * SPINS[d]
+    row = [
+        Body(shape, 1.0, moment, (x, *aside, *UPRIGHT[d]), (v, *aside, *spins))
+        for shape, x, v in ((rod, 0.0, 1.0), (block, 1.0, 0.0), (rod, 2.0, 0.0))
+    ]
+    found = certify(Model(d, row, (0.0,) * d, 0.05, 0.0), Settings.reference(DT), 240)
+    assert found.holds
+    mean = (0.0 + 1.0 + 2.0 + 1.0) / 3.0
+    assert np.abs(found.pose[-1, :, 0] - (mean - 0.9, mean, mean + 0.9)).max() < SMALL
+
+
+def test_three_discs_that_come_to_rest_in_a_corner():
+    """Their rebounds accumulate from the floor and from the wall, and end where all touch."""
+    radius, lean, wall = 0.3, 0.8, Body(HalfSpace((1.0, 0.0)), motion="fixed")
+    discs = [ball(2, (0.4 + 0.9 * k, 0.35 - 0.02 * k), (-0.5, 0.1 * k), 1.0 + k, radius) for k in range(3)]
+    gravity = (-G * math.sin(lean), -G * math.cos(lean))
+    found = certify(Model(2, [ground(2), wall, *discs], gravity, 0.3, 0.0), Settings.reference(DT), 480)
+    assert found.holds
+    assert np.abs(found.pose[-1, 2:, :2] - [((1 + 2 * k) * radius, radius) for k in range(3)]).max() < SMALL
+
+
+def test_slide_of_a_box_that_is_turned_and_boosted():
+    lean, mu, speed, boost = 0.7, 0.4, 3.0, np.array((-30.0, 20.0))
+    normal, way = np.array((math.sin(lean), math.cos(lean))), np.array((math.cos(lean), -math.sin(lean)))
+    floor = Body(HalfSpace(tuple(normal)), twist=(*boost, 0.0), motion="prescribed")
+    start = box(2, (0.5, 0.25), tuple(0.25 * normal), tuple(boost + speed * way))
+    turned = replace(start, pose=(*start.pose[:2], -lean))
+    found = certify(Model(2, [floor, turned], tuple(-G * normal), 0.0, mu), Settings.reference(DT), 240)
+    assert found.holds
+    t = np.minimum(found.t, speed / (mu * G))[:, None]
+    truth = boost * found.t[:, None] + (speed * t - 0.5 * mu * G * t * t) * way + 0.25 * normal
+    assert np.abs(found.pose[:, 1, :2] - truth).max() < SMALL
+
+
 def test_slide_with_a_closing_speed_of_round_off():
     """An edge meets the floor with 2e-10 m/s where the box slides with 2 m/s: no impact without end, and it slides."""
     sliding = box(2, (1.0, 0.25), up(2, 0.25))
