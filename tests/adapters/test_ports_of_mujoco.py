@@ -93,6 +93,43 @@ def test_elliptic_cones_of_pairs_without_friction_in_mjx(rough):
 
 
 @pytest.mark.optional("mujoco_mjx")
+def test_overlap_below_a_micrometre_in_mjx():
+    """Of two boxes it has no contacts then; of a box and a plane it has."""
+    lower = Body("box", Box((0.2,) * 3), 1.0, (0.03,) * 3, (0.0, 0.0, 0.2, *UPRIGHT))
+    for deep, boxes in ((5e-7, 0), (2e-6, 4)):
+        upper = replace(lower, name="upper", pose=(0.0, 0.0, 0.6 - deep, *UPRIGHT))
+        scene = replace(ball(0.3), bodies=(FLOOR, replace(lower, motion="fixed"), upper), duration=DT)
+        counts = [len(ran(each, scene).contacts.rows.a) for each in (ORIGINAL, MujocoMjxEngine())]
+        assert counts == [4, boxes]
+
+
+@pytest.mark.optional("mujoco_mjx")
+def test_box_in_the_margin_of_a_plane_in_mjx():
+    """No corner overlaps the plane, and not all four lowest ones are contacts."""
+    for gap, corners in ((1e-4, False), (-1e-4, True)):
+        box = Body("box", Box((0.2,) * 3), 1.0, (0.03,) * 3, (0.0, 0.0, 0.2 + gap, *UPRIGHT))
+        scene = replace(ball(0.3), bodies=(FLOOR, box), duration=DT)
+        here, there = (len(ran(each, scene, margin=1e-3).contacts.rows.a) for each in (ORIGINAL, MujocoMjxEngine()))
+        assert here == 4 and (there == 4) == corners
+
+
+@pytest.mark.optional("mujoco_mjx")
+def test_mappings_of_memory_that_mjx_keeps():
+    """Linux allows 65530 of a process, and beyond it JAX aborts."""
+    from adapters.mujoco import mjx
+
+    def mappings():
+        with open("/proc/self/maps", encoding="ascii") as stream:
+            return sum(1 for _ in stream)
+
+    mjx._steps.cache_clear()
+    ran(MujocoMjxEngine(), ball(0.3))
+    kept, held = mjx._steps.cache_info().maxsize, mappings()
+    mjx._steps.cache_clear()
+    assert 300 < held - mappings() < 65530 / 2 / kept
+
+
+@pytest.mark.optional("mujoco_mjx")
 def test_precision_of_mjx():
     double, single = (ran(engine, ball(0.3)) for engine in (MujocoMjxEngine(), MujocoMjxSingleEngine()))
     assert 1e-9 < np.abs(double.pose - single.pose).max() < 1e-5

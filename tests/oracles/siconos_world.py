@@ -1,9 +1,10 @@
 """Siconos as a program: Moreau and Jean's time stepping, its impact law and its solvers of contacts with friction.
 
-    M (v' - v) = dt f + J^T p,   0 <= p_n  perp  v_n' + e v_n >= 0,   |p_t| <= mu p_n,   q' = q + dt (v + v')/2
+    M (v' - v) = dt f + J^T p,   0 <= p_n  perp  v_n' + e v_n >= 0,   |p_t| <= mu p_n,   q' = q + dt v'
 
-A relation of Siconos is linear in the coordinates here, ``y = C q + b``; C and b are written before each
-step. Only Debian's own Python can import `python3-siconos`.
+A relation of Siconos is linear in the coordinates here, ``y = C q + b``; C and b are written before each step, and v_n
+with them. With its usual theta = 1/2, q' = q + dt (v + v')/2, what swings on a contact of the step's start gains height
+with each step. Only Debian's own Python can import `python3-siconos`.
 """
 
 import numpy as np
@@ -34,7 +35,8 @@ class Siconos(World):
         options.dparam[numerics.SICONOS_DPARAM_TOL] = settings["tolerance"]
         options.iparam[numerics.SICONOS_IPARAM_MAX_ITER] = 100_000
         clock = kernel.TimeDiscretisation(0.0, dt)
-        self.steps = kernel.TimeStepping(self.model, clock, kernel.MoreauJeanOSI(0.5), problem)
+        self.steps = kernel.TimeStepping(self.model, clock, kernel.MoreauJeanOSI(1.0), problem)
+        self.steps.initialize()
 
     def _link(self, i, j):
         own = [k for k in (i, j) if k in self.systems]
@@ -49,10 +51,12 @@ class Siconos(World):
 
     def step(self):
         posed = list(self.rows())
-        for (_, _, gap, jacobian), (own, relation, *_) in zip(posed, self.links, strict=True):
+        for (_, _, gap, jacobian), (own, relation, interaction, _) in zip(posed, self.links, strict=True):
             told, constant = relation.C(), relation.e()
             told[:] = np.hstack([jacobian[k] for k in own])
             constant[0] = gap - ROUNDING - told[0] @ np.concatenate([self.systems[k].q() for k in own])
+            interaction.computeOutput(0.0, 1)
+            interaction.swapInMemory()
         before = {k: np.array(system.q()) for k, system in self.systems.items()}
         self.steps.computeOneStep()
         pushed = [np.array(interaction.lambda_(1)) for _, _, interaction, _ in self.links]
@@ -64,5 +68,5 @@ class Siconos(World):
 
 
 if __name__ == "__main__":
-    order = "contacts and forces, position by the mean of velocities"
+    order = "contacts and forces, then position"
     serve(hello("siconos", "4.4.0", order, TOLERANCE), Siconos)

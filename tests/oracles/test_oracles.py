@@ -45,8 +45,20 @@ SCENES = [
     ("siconos", "incline", 2, {"ratio": 2.0}),
     ("siconos", "shove", 2, {}),
     ("siconos", "stack", 2, {"n": 3, "duration": 1.0}),
+    ("siconos", "rack", 2, {}),
+    ("siconos", "kane", 2, {}),
+    ("siconos", "rocking_block", 2, {}),
+    ("siconos", "pivot", 2, {}),
+    ("siconos", "rocker", 2, {}),
+    ("siconos", "pinch", 2, {}),
+    ("siconos", "ladder", 2, {"ratio": 0.8}),
+    ("siconos", "v_groove", 2, {}),
+    ("siconos", "scales", 2, {}),
+    ("siconos", "overlap", 2, {}),
     ("nivp", "impact", 2, {"e": 0.5}),
     ("nivp", "head_on", 2, {}),
+    ("nivp", "cradle", 2, {}),
+    ("nivp", "rack", 2, {}),
 ]
 #: Scenes in which the planted fault moves something.
 MOVED = [each for each in SCENES if each[1] in ("impact", "head_on", "off_centre", "oblique", "slide", "slide_to_roll")]

@@ -30,7 +30,7 @@ def hello(name, version, order, settings):
         "facts": {
             "title": name,
             "dimensions": [2, 3],
-            "scheme": {"order": order, "position_offset": 0},
+            "scheme": {"order": order, "position_offset": 1},
             "customary_dt": 0.001,
         },
         "profiles": {"plain": settings},
@@ -148,7 +148,7 @@ class World:
     def _on_plane(self, place, radius, plane):
         normal = np.array(plane["normal"])
         gap = place @ normal - plane["offset"] - radius
-        return place - (radius + gap) * normal, normal, gap
+        return place - radius * normal, normal, gap
 
     def _balls(self, i, j, a, b):
         between = self._place(i) - self._place(j)
@@ -163,7 +163,7 @@ class World:
         side = math.copysign(1.0, towards[axis])
         over = side * local[axis] - half[axis]
         past = np.delete(np.abs(local) - half, axis).max() > EDGE
-        return place - (radius + over) * side * axes[:, axis], side * axes[:, axis], FAR if past else over - radius
+        return place - radius * side * axes[:, axis], side * axes[:, axis], FAR if past else over - radius
 
 
 def serve(greeting, world):
