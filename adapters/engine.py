@@ -309,8 +309,8 @@ class Engine(ABC):
     #: Writers of a run for the engine alone, by format (``crosscheck export --to``). The scene has a dimension of the
     #: engine; what a format cannot express raises `EngineError`.
     exports: Mapping[str, Writer] = MappingProxyType({})
-    #: Of a port: settings, each tried in both engines where its motion differs from the original's.
-    switches: tuple[Mapping[str, Any], ...] = ()
+    #: Of a port: causes by which its motion may differ from the original's, with settings that remove them from both.
+    switches: Mapping[str, Mapping[str, Any]] = MappingProxyType({})
     #: Files other than Python modules that its results depend on, such as a program that it starts.
     sources: tuple[Path, ...] = ()
     #: Readers of model files of this engine, by file ending (`adapters.model`).

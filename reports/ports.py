@@ -6,8 +6,9 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from adapters import registry
 from adapters.law.single_precision import ROUNDINGS
-from validation.releases.ports import LOST, MOVES, SHARE
+from validation.releases.ports import LOST, MOVES, SHARE, proof_of
 
 Row = Mapping[str, str]
 #: Verdicts without a comparison of motions, in words.
@@ -40,17 +41,24 @@ def case_of(row: Row) -> str:
 
 
 def counts(rows: Sequence[Row], port: str) -> str:
-    """Number of cases by verdict; of those that differ also how many are the same with a setting."""
+    """Number of cases by verdict; of those that differ also how many are the same with no setting."""
     own = [row for row in rows if row["port"] == port]
     count = Counter(row["verdict"] for row in own)
-    proven = sum(bool(row["proof"]) for row in own if row["verdict"] == "differs")
-    unknown = count["differs"] - proven
-    words = {
-        "same": "same",
-        "differs": f"differ ({proven} with a setting that proves why, {unknown} with no cause found)",
-        **UNMOVED,
-    }
+    unknown = sum(not row["proof"] for row in own if row["verdict"] == "differs")
+    words = {"same": "same", "differs": "differ" + (f" ({unknown} with no cause found)" if unknown else ""), **UNMOVED}
     return f"{port}: {', '.join(f'{count[verdict]} {said}' for verdict, said in words.items() if count[verdict])}"
+
+
+def causes(rows: Sequence[Row], ports: Sequence[str]) -> list[tuple[str, str, list[str]]]:
+    """Causes of differences, the settings that prove them, and the number of cases by port; most frequent first."""
+    found: dict[tuple[str, str], Counter[str]] = {}
+    for row in rows:
+        if row["verdict"] == "differs" and row["proof"]:
+            engine = registry.adapter(row["port"])
+            switches = {proof_of(switched): cause for cause, switched in engine.switches.items()} if engine else {}
+            found.setdefault((switches.get(row["proof"], ""), row["proof"]), Counter())[row["port"]] += 1
+    often = sorted(found, key=lambda each: -found[each].total())
+    return [(cause, proof, [str(found[cause, proof][port] or "") for port in ports]) for cause, proof in often]
 
 
 def told(rows: Sequence[Row]) -> dict[str, Any]:
@@ -62,6 +70,7 @@ def told(rows: Sequence[Row]) -> dict[str, Any]:
     return {
         "releases": " and ".join(sorted({row["release"] for row in rows})),
         "ports": ports,
+        "causes": causes(rows, ports),
         "counts": [counts(rows, port) for port in ports],
         "cases": [(case, [cells.get(port, "not run") for port in ports]) for case, cells in sorted(cases.items())],
         "moves": MOVES,

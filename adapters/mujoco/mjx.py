@@ -15,7 +15,7 @@ from typing import Any, final
 import numpy as np
 
 from adapters.engine import Expected, ProfileRule, Quirk, Recorded, Setting
-from adapters.mujoco.port import PortEngine, PortSimulation, port_facts
+from adapters.mujoco.port import SMOOTH, PortEngine, PortSimulation, port_facts
 from adapters.mujoco.profiles import PROFILES
 from adapters.needs import Needs
 from adapters.settings import word
@@ -168,11 +168,15 @@ class MjxPort(PortEngine):
             "measured with 3.17.0: with friction 1e-5 or smooth_condim=1 it rebounds as in C within 1e-4",
         ),
     )
-    #: Friction rows that a smooth pair has not; no margin; bodies that rest a hundred times as deep.
-    switches = (
-        {"smooth_condim": 1},
-        {"margin": 0.0},
-        {"margin": 0.0, "solimp": (0.99, 0.99, 0.001, 0.5, 1.0)},
+    switches = MappingProxyType(
+        {
+            SMOOTH: {"smooth_condim": 1},
+            "corners of a box in the margin of a plane may be no contacts": {"margin": 0.0},
+            "two boxes have contacts from an overlap of 1e-6 m on": {
+                "margin": 0.0,
+                "solimp": (0.99, 0.99, 0.001, 0.5, 1.0),  # they rest a hundred times as deep
+            },
+        }
     )
     own: Mapping[str, Any] = MappingProxyType({"precision": word("double", "single")})
 

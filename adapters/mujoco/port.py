@@ -26,6 +26,8 @@ from adapters.settings import Check, checked_step
 
 #: What the adapter of a port leaves to MuJoCo C: it enters velocities between the halves of a step.
 MOVED = frozenset({"surface velocity", "moving half-space", "course"})
+#: A cause of differences.
+SMOOTH = "pairs without friction keep rows of friction, of 1e-5 in C"
 #: The adapter of MuJoCo C.
 ORIGINAL = MujocoEngine()
 
@@ -95,16 +97,16 @@ class PortEngine(Engine):
     simulation: Callable[[Scene, float, Mapping[str, Any]], Simulation]
     #: Settings of the port alone.
     own: Mapping[str, Check] = MappingProxyType({})
-    #: Contacts that begin before bodies touch, where round-off decides; friction rows that a smooth pair has not;
-    #: the least tolerance of single precision; other cones and starts of the solver.
-    switches: tuple[Mapping[str, Any], ...] = (
-        {"smooth_condim": 1},
-        {"margin": 1e-3},
-        {"margin": 1e-3, "smooth_condim": 1},
-        {"tolerance": 1e-6},
-        {"cone": "elliptic"},
-        {"cone": "pyramidal", "solreffriction": None},
-        {"disabled": ("warmstart",)},
+    switches: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+        {
+            SMOOTH: {"smooth_condim": 1},
+            "round-off decides whether bodies that touch are in contact": {"margin": 1e-3},
+            "friction rows without friction, and touching bodies": {"margin": 1e-3, "smooth_condim": 1},
+            "the tolerance of its solver is at least 1e-6": {"tolerance": 1e-6},
+            "edges of its friction pyramids are alike": {"cone": "elliptic"},
+            "elliptic cones, or the damping of their friction": {"cone": "pyramidal", "solreffriction": None},
+            "its solver starts elsewhere in each step": {"disabled": ("warmstart",)},
+        }
     )
 
     def version(self) -> str:

@@ -121,14 +121,19 @@ def ask(slot: Slot, port: str) -> Compared:
     found = _asked(blank, own, ported, posed, {})
     if found.verdict == "failed" or found.whole:
         return found
-    for switched in ported.switches:
+    for switched in ported.switches.values():
         again = _asked(blank, own, ported, posed, switched)
         # A setting may also make round-off larger; so the distance must go as well, where the port did not end.
         gone = bool(found.because) or SHARE * again.apart < found.apart
         beyond = again.verdict == "same" and again.until > found.since and gone
         if beyond if found.verdict == "differs" else again.whole:
-            return replace(found, proof=", ".join(f"{name}={text_of(value)}" for name, value in switched.items()))
+            return replace(found, proof=proof_of(switched))
     return found
+
+
+def proof_of(switched: Mapping[str, Any]) -> str:
+    """Settings as `Compared.proof` has them."""
+    return ", ".join(f"{name}={text_of(value)}" for name, value in switched.items())
 
 
 def _asked(blank: Compared, own: Engine, ported: Engine, posed: Scene, switched: Mapping[str, Any]) -> Compared:

@@ -23,7 +23,7 @@ class Port(port.PortEngine):
     """MuJoCo C that reads one setting otherwise."""
 
     facts = port.port_facts("port", "Port", "port", "single")
-    switches = ({"impratio": 2.0},)
+    switches = {"friction is less stiff": {"impratio": 2.0}}  # noqa: RUF012
 
     def __init__(self, **changes):
         self.changes = changes
@@ -201,6 +201,7 @@ def test_port_beside_another_release(monkeypatch):
 
 def test_kept_table(monkeypatch, tmp_path):
     monkeypatch.setattr(kept, "folder_of", lambda engine: tmp_path)
+    monkeypatch.setattr(registry, "adapter", lambda name: Port())
     monkeypatch.setattr("adapters.engine_folder.folder_of", lambda engine: tmp_path)
     monkeypatch.setattr(kept, "cache_folder", lambda: tmp_path)
     assert kept.kept("mujoco") == ()
@@ -215,6 +216,10 @@ def test_kept_table(monkeypatch, tmp_path):
     assert [(row["scene"], row["proof"]) for row in rows] == [("conveyor", ""), ("oblique", "impratio=2")]
     page = told(rows)
     assert page["cases"][0] == ("conveyor 3-D default", ["unsupported: no"])
-    assert page["counts"] == ["port: 1 differ (1 with a setting that proves why, 0 with no cause found), 1 unsupported"]
+    assert page["counts"] == ["port: 1 differ, 1 unsupported"]
+    assert page["causes"] == [("friction is less stiff", "impratio=2", ["1"])]
+    assert (
+        counts([row | {"proof": ""} for row in rows], "port") == "port: 1 differ (1 with no cause found), 1 unsupported"
+    )
     assert sentence(rows[1] | {"proof": ""}).startswith("differs, no cause found: by ")
     assert sentence(rows[1]).endswith("; the same with impratio=2") and counts(rows, "other") == "other: "
