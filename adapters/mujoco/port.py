@@ -18,6 +18,7 @@ from typing import Any
 from adapters.engine import Array, Declared, Engine, EngineError, EngineFacts, Precision, Quirk, Simulation
 from adapters.mujoco.engine import MujocoEngine
 from adapters.mujoco.profiles import PROFILES
+from adapters.mujoco.shipped import SOLIMP
 from adapters.mujoco.simulation import MujocoSimulation
 from adapters.needs import Needs, needs
 from adapters.plain import one_line
@@ -26,8 +27,9 @@ from adapters.settings import Check, checked_step
 
 #: What the adapter of a port leaves to MuJoCo C: it enters velocities between the halves of a step.
 MOVED = frozenset({"surface velocity", "moving half-space", "course"})
-#: A cause of differences.
+#: Causes of differences; contacts are as stiff as in C without a margin, and as shipped.
 SMOOTH = "pairs without friction keep rows of friction, of 1e-5 in C"
+STIFF = {"contacts of profile tuned are too stiff for single precision": {"margin": 0.0, "solimp": SOLIMP}}
 #: The adapter of MuJoCo C.
 ORIGINAL = MujocoEngine()
 

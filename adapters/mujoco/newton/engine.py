@@ -16,10 +16,9 @@ import numpy as np
 
 from adapters.engine import Array, EngineError, ProfileRule, Quirk, Setting
 from adapters.law.single_precision import UNIT
-from adapters.mujoco.port import PortEngine, port_facts
+from adapters.mujoco.port import STIFF, PortEngine, port_facts
 from adapters.mujoco.profiles import PROFILES
 from adapters.mujoco.releases import Mjcf, no_autoreset
-from adapters.mujoco.shipped import SOLIMP
 from adapters.mujoco.spec import Spec, rotation
 from adapters.mujoco.warp import CONTACTS, MujocoWarpEngine, WarpSimulation, imported
 from adapters.needs import Needs
@@ -174,10 +173,7 @@ class NewtonMujocoEngine(PortEngine):
         {
             **PortEngine.switches,
             "margins are 0 in a model with a box": {"margin": 0.0},
-            "without a margin, rounding opens contacts as stiff as tuned ones": {
-                "margin": 0.0,
-                "solimp": SOLIMP,
-            },
+            **STIFF,
             "each step converts the state and back": {"update_data_interval": 0},
             "margins and conversion": {"margin": 0.0, "update_data_interval": 0},
         }
