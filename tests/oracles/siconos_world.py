@@ -36,6 +36,7 @@ class Siconos(World):
         options.iparam[numerics.SICONOS_IPARAM_MAX_ITER] = 100_000
         clock = kernel.TimeDiscretisation(0.0, dt)
         self.steps = kernel.TimeStepping(self.model, clock, kernel.MoreauJeanOSI(1.0), problem)
+        self._posed()
         self.steps.initialize()
 
     def _link(self, i, j):
@@ -49,12 +50,18 @@ class Siconos(World):
         self.model.link(interaction, *[self.systems[k] for k in own])
         return own, relation, interaction, law
 
-    def step(self):
+    def _posed(self):
+        """Write C and b of each relation; the first step needs them before Siconos starts."""
         posed = list(self.rows())
-        for (_, _, gap, jacobian), (own, relation, interaction, _) in zip(posed, self.links, strict=True):
+        for (_, _, gap, jacobian), (own, relation, *_) in zip(posed, self.links, strict=True):
             told, constant = relation.C(), relation.e()
             told[:] = np.hstack([jacobian[k] for k in own])
             constant[0] = gap - ROUNDING - told[0] @ np.concatenate([self.systems[k].q() for k in own])
+        return posed
+
+    def step(self):
+        posed = self._posed()
+        for _, _, interaction, _ in self.links:
             interaction.computeOutput(0.0, 1)
             interaction.swapInMemory()
         before = {k: np.array(system.q()) for k, system in self.systems.items()}
