@@ -171,7 +171,7 @@ class MjxPort(PortEngine):
 
     module = "mujoco.mjx"
     simulation = MjxSimulation
-    expected = (
+    expected: tuple[Expected, ...] = (
         Expected(
             "receipt restitution",
             "a pair without friction has 0 in its rows of friction, and rebounds by another law than C",
