@@ -30,7 +30,7 @@ from validation.fixes.kept import Cure, cures_of, read, write
 from validation.fixes.search import Unsearched, _best, _Trials, asked_of, search
 from validation.metrics import OUT_OF_PLANE
 from validation.posed import resolve
-from validation.settings.switching import readings, switched
+from validation.settings.switching import readings
 
 CURE = Cure(
     "mujoco", "4.0.1", "default", "pinch", 2, ({}, {"margin": 1.05}), 5, 0, 12, "creep", "m/s", {"margin": 1.05}, 0.0,
@@ -560,11 +560,22 @@ def test_search_at_both_phases_of_a_blow():
     assert begins[1:] == pytest.approx(cures.PHASES) and {slot.dt for slot in found} == {cures.ELSEWHERE[1]}
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
-def test_mujoco_s_fix_of_head_on_by_phase(dimension):
-    pytest.importorskip("mujoco")
-    changes = cures_of("mujoco")["head_on", dimension].changes
-    start = Slot("head_on", (("e", 1.0), ("ratio", 1.0)), dimension, "mujoco", "default", 1 / 240)
-    fixed = [switched(slot, changes) for slot in cures.in_other_size(start)]
-    for found in cures.observe(fixed).values():
-        assert all(reading.badness <= 1.0 for reading in readings(found))
+@pytest.mark.few(4)
+@pytest.mark.parametrize(
+    "fix",
+    [
+        pytest.param(fix, id=f"{engine}-{scene}-{dimension}")
+        for engine in ("bullet", "chipmunk", "mujoco")
+        for (scene, dimension), fix in cures_of(engine).items()
+        if fix.changes and any(each.name == "delay" for each in resolve(scene).parameters)
+    ],
+)
+def test_kept_fix_of_a_blow_at_both_phases(fix):
+    """At the same values as in the shown case."""
+    pytest.importorskip({"bullet": "pybullet", "chipmunk": "pymunk"}.get(fix.engine, fix.engine))
+    own = [
+        Slot(fix.scene, tuple(sorted(cell.items())), fix.dimension, fix.engine, fix.shipped, fix.dt)
+        for cell in fix.cells
+    ]
+    (found,) = _Trials(own, 1, cures.in_other_size).all([[fix.changes] * len(own)])
+    assert not found.broken and found.failing <= fix.left
