@@ -20,9 +20,9 @@ Indices = NDArray[np.int64]
 
 #: What a piece is: a force phase; an impact.
 FORCES, IMPACT = 0, 1
-#: By which scheme: constant acceleration (E19), fifth order where rows turn (E35), until two bodies that rock rest on
+#: By which scheme: constant acceleration (E19), in steps where rows turn (E35), until two bodies that rock rest on
 #: each other (E22). CHAIN: an impact that is the sum of all those to come, which have no end (E22).
-FROZEN, FIFTH_ORDER, ROCKING, CHAIN = 0, 1, 2, 3
+FROZEN, TURNING, ROCKING, CHAIN = 0, 1, 2, 3
 
 
 class Journal(NamedTuple):

@@ -11,6 +11,8 @@ PositionCorrection = Literal["split", "baumgarte", "none"]
 
 #: Error that a step of the event loop may make where contacts turn, as a share of the motion in it.
 TOLERANCE = 1e-11
+#: Least and largest that may be set.
+TOLERANCES = (1e-12, 1e-4)
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,8 @@ class Settings:
         _require("solver", self.solver, self.solver in ("scalar", "block"), "'scalar' or 'block'")
         _require("margin", self.margin, 0.0 <= self.margin < 0.1, "in [0, 0.1)")
         share = self.tolerance
-        _require("tolerance", share, share is None or 1e-12 <= share <= 1e-4, "None or in [1e-12, 1e-4]")
+        least, most = TOLERANCES
+        _require("tolerance", share, share is None or least <= share <= most, f"None or in [{least:g}, {most:g}]")
 
     @property
     def is_textbook(self) -> bool:

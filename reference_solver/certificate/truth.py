@@ -9,9 +9,12 @@ far apart two motions can be that both obey the laws, where contacts can share a
 (`audit.sharing`). Where that distance is visible before the horizon, the run is refused. Bodies that touch and go apart
 at once meet, or do not, as round-off has it: what that moves comes to it as well (`audit.contact`).
 
+*Start.* A contact that is open by a gap that counts as none is closed from the start on. In truth loads close it a
+little later, while its bodies move as if it were not there: what that changes of velocities goes on from there.
+
 *Place.* No law knows where the origin is; what touches is decided by gaps that are differences of coordinates. The run
-is made twice more far from the origin: what differs there, beyond the X of both and what coarser coordinates explain,
-refuses. The rest, as the run's own coordinates are smaller, is in X.
+is made twice more far from the origin, and a world that stands farther away near it: what differs there, beyond the X
+of both and what coarser coordinates explain, refuses. The rest, as the run's own coordinates are smaller, is in X.
 
 *Horizon.* The run is made once more from velocities that are disturbed in their last places. Until the disturbance
 has grown ``GROWTH`` times over what it would be in free flight, a run can be truth to all but the last few digits;
@@ -42,14 +45,19 @@ from reference_solver.certificate.audit import (
 )
 from reference_solver.certificate.audit.run import twist_of
 from reference_solver.certificate.relations import Change, permuted
-from reference_solver.exact.bodies import world_of
+from reference_solver.exact.bodies import start_of, world_of
 from reference_solver.exact.features import no_gap
+from reference_solver.exact.forces import decide
+from reference_solver.exact.impacts import strike
+from reference_solver.exact.motion import free_acceleration
+from reference_solver.exact.problem import ROUND_OFF
 from reference_solver.exact.refusals import Refused
+from reference_solver.exact.rows import touching_contacts
 from reference_solver.geometry import reach, rotation
 from reference_solver.model import POSE_SIZE, Array, Model
 from reference_solver.pieces import CHAIN, IMPACT
 from reference_solver.records import Record
-from reference_solver.settings import Settings
+from reference_solver.settings import TOLERANCES, Settings
 from reference_solver.shapes import smallest_extent
 from reference_solver.simulation import Simulation
 
@@ -58,9 +66,12 @@ GROWTH = 1e3
 #: Size of the disturbance, as a share of the fastest speed of the run: thousands of units in the last place, so that
 #: what it grows to is told from the round-off of either run.
 DISTURBANCE = 1e-12
-#: Shares of the tolerance of the event loop to which a run is made again. The finer one's steps are three quarters as
-#: long, those of the coarser one 1.3 times.
-TOLERANCES = (0.1, 10.0)
+#: Shares of the tolerance of the event loop to which a run is made again, where these may be set. The finer one's steps
+#: are three quarters as long, those of the coarser one 1.3 times.
+SHARES = (0.1, 10.0)
+#: Least time for which bodies fall, as a share of the world's, where it is asked what the fall through a gap changes:
+#: speeds are well above round-off then, and hardly any slip ends. What it changes is proportional to that time.
+FALL = 1e-4
 #: Steps within which what happens a little sooner or later far from the origin may be told.
 BLOCK = 5
 #: What a solve leaves of its speeds (E73), so that a run moves by a tenth of what the disturbance moves it.
@@ -170,7 +181,7 @@ SERIES_ENDS, SERIES_STEPS = 1e-11, 100.0
 def certify(model: Model, settings: Settings, steps: int, stride: int = 1, others: Sequence[Array] = ()) -> Certificate:
     """Run ``model`` and certify the run; costs seven runs, five if all motion is in closed form, and the audit.
 
-    ``others``: poses (s, n, 3 | 7) of the runs to `TOLERANCES`, which else are made here.
+    ``others``: poses (s, n, 3 | 7) of the runs to `SHARES` of the tolerance, which else are made here.
 
     Raises
     ------
@@ -208,6 +219,8 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1, other
     round_off = np.maximum.accumulate(moved * SOLVE / DISTURBANCE)
     error = _error(model, run, record, steps, stride, others) + round_off
     error += np.where(record.t >= _first_chain(record), gap * (1.0 + growth), 0.0)
+    open_by, speed = _open_at_start(model)
+    error += (open_by + speed * record.t) * np.clip(growth, 1.0, GROWTH)
     # Bodies meet within the units in which coordinates are known, each time, and go on from there.
     assert record.pieces is not None
     met = np.searchsorted(record.pieces.begin[record.pieces.kind == IMPACT], record.t, side="right")
@@ -231,6 +244,45 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1, other
     if horizon < record.t[-1]:
         reasons.append(beyond)
     return replace(found, holds=holds, reasons=tuple(reasons))
+
+
+def _open_at_start(model: Model) -> tuple[float, float]:
+    """Return the largest gap that is held from the start [m], and how much faster bodies are once it has closed [m/s].
+
+    With accelerations a of the contacts without a gap, bodies fall through gaps δ for T = √(2 δ/c), where c is how fast
+    a closes them, and are stopped. The run has the accelerations a' of all contacts instead: T a' of velocities.
+    """
+    world, state = world_of(replace(model, restitution=0.0)), start_of(model)
+    contacts = touching_contacts(world, state)
+    if not len(contacts):
+        return 0.0, 0.0
+    contacts = contacts.chosen(np.abs(contacts.rows.speed[:, 0]) < world.still)
+    gaps = contacts.rows.gap.copy()
+    if not (gaps > 0.0).any():
+        return 0.0, 0.0
+    free = free_acceleration(world, state.axes, state.velocity)
+    try:
+        open_ones = decide(world, state, contacts.chosen(gaps <= 0.0), free).acceleration
+    except Refused:
+        open_ones = free
+    closing = -contacts.at_state(state.moving(open_ones)).rows.speed[:, 0]
+    falls = (gaps > 0.0) & (closing > ROUND_OFF * world.weight)
+    if not falls.any():
+        return float(gaps.max()), 0.0
+    time = float(np.sqrt(2.0 * gaps[falls] / closing[falls]).max())
+    seen = max(time, FALL * world.time)
+    fallen = state.moving(state.velocity + seen * open_ones)
+    try:
+        held = decide(world, state, contacts.at_state(state), free).acceleration
+        blows = strike(world, fallen, contacts.at_state(fallen))
+        after = blows[-1].after if blows else fallen
+        change = after.velocity - state.velocity - seen * held
+    except Refused:
+        change = seen * open_ones
+    d = model.dimension
+    lengths = np.array([reach(body.shape) if body.motion == "free" else 0.0 for body in model.bodies])
+    apart = np.linalg.norm(change[:, :d], axis=1) + lengths * np.linalg.norm(change[:, d:], axis=1)
+    return float(gaps.max()), float(apart[lengths > 0.0].max(initial=0.0)) * time / seen
 
 
 def _no_run(model: Model, settings: Settings, samples: int, stride: int, why: str) -> Certificate:
@@ -318,13 +370,16 @@ def _misplaced(
     """
     within, d, rounded = found.t < found.horizon, model.dimension, np.zeros(len(found.t))
     here = float(np.nanmax(np.abs(found.pose[:, :, :d])))
-    for far in PLACES:
-        change = away(model, far)
+    changes = {f"moved by {far:g} half widths": away(model, far) for far in PLACES}
+    if here > PLACES[-1] * _size(model):
+        middle = np.mean([body.pose[:d] for body in model.bodies if body.motion == "free"], axis=0)
+        changes["moved to the origin"] = Change(d, shift=tuple((-middle).tolist()))
+    for where, change in changes.items():
         moved = poses_of(change.model(model), settings, steps, stride)
         apart = distance(model, change.pose(found.pose, found.t), moved)
         # Either run is within X of the truth. What happens a little sooner or later there X may tell a block later.
         error = found.error[np.minimum(np.arange(len(within)) + BLOCK, np.flatnonzero(within)[-1])]
-        place = float(np.nanmax(np.abs(moved[:, :, :d])))
+        place = max(here, float(np.nanmax(np.abs(moved[:, :, :d]))))
         allowed = 2.0 * error + found.rounding(place)
         if (within & ~(apart <= allowed)).any():
             allowed += _grazed_there(change.model(model), settings, found, steps, stride, place)
@@ -332,8 +387,8 @@ def _misplaced(
         if len(beyond):
             k = int(beyond[0])
             said = f"{apart[k]:.3g} m at {found.t[k]:.3g} s, at most {allowed[k]:.3g} m is round-off"
-            return [f"moved by {far:g} half widths it comes out otherwise: {said}"], rounded
-        rounded = np.maximum(rounded, apart * min(1.0, here / place))
+            return [f"{where} it comes out otherwise: {said}"], rounded
+        rounded = np.maximum(rounded, apart * (here / place))
     return [], rounded
 
 
@@ -353,7 +408,7 @@ def _error(model: Model, run: Simulation, record: Record, steps: int, stride: in
     assert settings.tolerance is not None
     error = distance(model, record.pose, _mirrored(model, settings, steps, stride))
     if not (run.is_closed or others):
-        tolerances = [share * settings.tolerance for share in TOLERANCES]
+        tolerances = [min(max(share * settings.tolerance, TOLERANCES[0]), TOLERANCES[1]) for share in SHARES]
         others = [poses_of(model, replace(settings, tolerance=each), steps, stride) for each in tolerances]
     for other in others:
         error = np.maximum(error, 2.0 * distance(model, record.pose, other))

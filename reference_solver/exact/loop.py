@@ -21,6 +21,7 @@ from reference_solver.exact.rows import Contacts, touching_contacts
 from reference_solver.exact.series import settling
 from reference_solver.exact.stiff import step
 from reference_solver.model import Array
+from reference_solver.settings import TOLERANCE
 
 #: Pieces of a run: some 40 s of CPU.
 MOST_PIECES = 20_000
@@ -33,8 +34,9 @@ MOST_IN_A_ROW, ROW = 1000, 1e-3
 #: An instant in which impulses do what no forces can (E54), as a share of the world's time: loads make some hundred
 #: times the speed in it that counts as none.
 INSTANT = 4e-10
-#: First step of a motion that turns, as a share of the world's time; it is made shorter or longer to the tolerance.
-FIRST_STEP = 0.1
+#: First step of a motion that turns to the tolerance `TOLERANCE`, as a share of the world's time; it is made shorter or
+#: longer to the tolerance. A step of this order that nothing shortens differs between tolerances, too.
+FIRST_STEP, ORDER = 0.1, 8.0
 #: Modes that end while others go on: forces do not jump there.
 GO_ON = {Kind.LIFT: OPEN, Kind.SLIP: SLIP}
 #: Share of the tolerance that is asked for where a body that turns touches nothing: free rotation is known to nearly
@@ -186,7 +188,7 @@ class Loop:
             piece = constant(self.world, self.state, held, self.longest)
             if piece is not None:
                 return piece
-            self.next_length = FIRST_STEP * self.world.time
+            self.next_length = FIRST_STEP * self.world.time * (self.tolerance / TOLERANCE) ** (1.0 / ORDER)
         self.steps += 1
         length = min(self.next_length, self.longest)
         piece, self.next_length = step(self.world, self.state, held, self._tolerance_of(held), length)

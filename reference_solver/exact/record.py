@@ -22,7 +22,7 @@ from reference_solver.exact.forces import Held
 from reference_solver.exact.motion import Piece, free_acceleration
 from reference_solver.exact.rows import Contacts, labels, moments
 from reference_solver.model import Array
-from reference_solver.pieces import FIFTH_ORDER, FORCES, FROZEN, IMPACT, ROCKING, Indices, Journal, empty_journal
+from reference_solver.pieces import FORCES, FROZEN, IMPACT, ROCKING, TURNING, Indices, Journal, empty_journal
 from reference_solver.records import Contacts as Handed
 
 #: Share of the smallest half width by which ways of a part may differ from cubic polynomials: the audit's limit.
@@ -238,7 +238,7 @@ class Recorder:
             return
         bodies, own, k = np.concatenate([each for each, _ in groups]), [each for _, each in groups], len(steps)
         contacts = np.concatenate([np.flatnonzero(each) for each in own])
-        scheme = FIFTH_ORDER if piece.turns else FROZEN if piece.held.lasts is None else ROCKING
+        scheme = TURNING if piece.turns else FROZEN if piece.held.lasts is None else ROCKING
         label = np.zeros((k, len(groups), 5), np.int64)
         label[:, :, 0], label[:, :, 1] = steps[:, None], FORCES
         label[:, :, 2] = [scheme if each[:held].any() else FROZEN for each in own]

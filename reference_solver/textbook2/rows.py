@@ -106,7 +106,7 @@ def set_speed(bodies: Bodies, rows: Rows, c: int, options: Options) -> None:
     step before does not guess this step's, nor this one the next (E9).
     """
     a, b = rows.integer[c, A], rows.integer[c, B]
-    push = load_speed(bodies, rows, c, options.dt)
+    by_loads = load_speed(bodies, rows, c, options.dt)
     if options.certified:
         approach, slip = rows.real[c, APPROACH], tangent_velocity(bodies.twist, rows, c)
         meeting = math.sqrt(approach * approach + slip * slip)
@@ -114,10 +114,10 @@ def set_speed(bodies: Bodies, rows: Rows, c: int, options: Options) -> None:
         moving += speed_at(bodies, b, rows.real[c, ARM_B], rows.real[c, ARM_B + 1])
         # Bodies stand still to each other below this: loads elsewhere leave as much where none act.
         still = STILL * min(bodies.real[a, EXTENT], bodies.real[b, EXTENT]) / options.dt
-        rows.real[c, SPEED] = max(max(meeting, push), max(SPEED_SHARE * moving, still))
+        rows.real[c, SPEED] = max(max(meeting, by_loads), max(SPEED_SHARE * moving, still))
     approach = rows.real[c, APPROACH]
-    rows.integer[c, IMPACT] = 1 if abs(approach) > push else 0
-    if approach > push:
+    rows.integer[c, IMPACT] = 1 if abs(approach) > by_loads else 0
+    if approach > by_loads:
         rows.real[c, PN] = rows.real[c, PT] = 0.0
 
 

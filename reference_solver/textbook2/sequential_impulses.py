@@ -4,9 +4,8 @@ The rows of one manifold are solved in their own space: their velocities are rea
 changes the velocities of the other rows by the matrix W of the manifold (E12), and the bodies get the sum at the end.
 That is the same row after row, with fewer operations that wait for each other.
 
-In the second half of the sweeps the second point of two comes first. In one order throughout, what the last sweep
-leaves unsolved is always at the same corner, and a column creeps to one side until it falls. Turning round after each
-sweep would do as well, but solves the same row twice in a row, which changes nothing.
+In the second half of the sweeps the second point of two comes first (`iteration.sweep_often`). In one order throughout,
+what the last sweep leaves unsolved is always at the same corner, and a column creeps to that side.
 """
 
 from __future__ import annotations
@@ -66,13 +65,13 @@ def sweep_point(bodies: Bodies, rows: Rows, c: int, options: Options, relaxation
     ia, ib = bodies.real[a, INVERSE_INERTIA], bodies.real[b, INVERSE_INERTIA]
     nx, ny, an, bn, at, bt = row[NX], row[NY], row[AN], row[BN], row[AT], row[BT]
     x, y = vb[0] - va[0], vb[1] - va[1]
-    old_n, old_t, relaxed = row[PN], row[PT], relaxation * row[NORMAL_MASS]
-    n = max(old_n - relaxed * (nx * x + ny * y + (bn * vb[2] - an * va[2]) - row[TARGET]), 0.0)
+    old_n, old_t, mass_n = row[PN], row[PT], relaxation * row[NORMAL_MASS]
+    n = max(old_n - mass_n * (nx * x + ny * y + (bn * vb[2] - an * va[2]) - row[TARGET]), 0.0)
     row[PN], t = n, old_t
     if options.friction:
-        relaxed, k = relaxation * row[TANGENT_MASS], row[COUPLING]
-        rest = old_t - relaxed * (nx * y - ny * x + (bt * vb[2] - at * va[2]) - k * old_n)
-        t = into_interval(rest - relaxed * k * n, row[FRICTION] * n)
+        mass_t, k = relaxation * row[TANGENT_MASS], row[COUPLING]
+        known = old_t - mass_t * (nx * y - ny * x + (bt * vb[2] - at * va[2]) - k * old_n)
+        t = into_interval(known - mass_t * k * n, row[FRICTION] * n)
         row[PT] = t
     pn, pt = n - old_n, t - old_t
     va[0] = va[0] - mass_a * nx * pn + mass_a * ny * pt
@@ -88,8 +87,10 @@ def sweep_pair(bodies: Bodies, rows: Rows, m: int, backwards: int, options: Opti
     """Rows of a manifold of two points, which share their normal; ``backwards``: 1 where the second point comes first.
 
     In p := max(p - (u - b) / k, 0) the velocity u is that at the start plus W times what impulses have changed since.
-    All that is known at the start is taken together first (``rest``), so that a row waits for little.
+    All that is known at the start is taken together first (``known``), so that a row waits for little. For the same
+    reason the last friction impulse comes to the bodies after the sum of the others.
     """
+    # Rows of W: normal and friction of the point that comes first are i and i + 1, of the other j and j + 1.
     c, d, i, j = rows.manifold[m] + backwards, rows.manifold[m] + 1 - backwards, 2 * backwards, 2 - 2 * backwards
     a, b, one, two, w = rows.integer[c, A], rows.integer[c, B], rows.real[c], rows.real[d], rows.block[m]
     va, vb = bodies.twist[a], bodies.twist[b]
@@ -101,24 +102,22 @@ def sweep_pair(bodies: Bodies, rows: Rows, m: int, backwards: int, options: Opti
     at1, bt1, at2, bt2 = one[AT], one[BT], two[AT], two[BT]
     old_n1, old_t1, old_n2, old_t2 = one[PN], one[PT], two[PN], two[PT]
     t1, t2, friction = old_t1, old_t2, options.friction
-    relaxed = relaxation * one[NORMAL_MASS]
-    n1 = max(old_n1 - relaxed * (along + (bn1 * wb - an1 * wa) - one[TARGET]), 0.0)
+    mass_n1, mass_t1 = relaxation * one[NORMAL_MASS], relaxation * one[TANGENT_MASS]
+    mass_n2, mass_t2 = relaxation * two[NORMAL_MASS], relaxation * two[TANGENT_MASS]
+    n1 = max(old_n1 - mass_n1 * (along + (bn1 * wb - an1 * wa) - one[TARGET]), 0.0)
     if friction:
-        relaxed = relaxation * one[TANGENT_MASS]
-        rest = old_t1 - relaxed * (across + (bt1 * wb - at1 * wa) - w[i, i + 1] * old_n1)
-        t1 = into_interval(rest - relaxed * w[i, i + 1] * n1, one[FRICTION] * n1)
-    relaxed = relaxation * two[NORMAL_MASS]
-    rest = along + (bn2 * wb - an2 * wa) - two[TARGET] - w[i, j] * old_n1
+        known = old_t1 - mass_t1 * (across + (bt1 * wb - at1 * wa) - w[i, i + 1] * old_n1)
+        t1 = into_interval(known - mass_t1 * w[i, i + 1] * n1, one[FRICTION] * n1)
+    u = along + (bn2 * wb - an2 * wa) - two[TARGET] - w[i, j] * old_n1
     if friction:
-        rest = old_n2 - relaxed * (rest - w[i + 1, j] * old_t1)
-        n2 = max(rest - relaxed * w[i, j] * n1 - relaxed * w[i + 1, j] * t1, 0.0)
-        relaxed = relaxation * two[TANGENT_MASS]
-        rest = across + (bt2 * wb - at2 * wa) - w[i, j + 1] * old_n1 - w[i + 1, j + 1] * old_t1
-        rest = old_t2 - relaxed * (rest - w[j, j + 1] * old_n2)
-        rest = rest - relaxed * w[i, j + 1] * n1 - relaxed * w[i + 1, j + 1] * t1
-        t2 = into_interval(rest - relaxed * w[j, j + 1] * n2, two[FRICTION] * n2)
+        known = old_n2 - mass_n2 * (u - w[i + 1, j] * old_t1)
+        n2 = max(known - mass_n2 * w[i, j] * n1 - mass_n2 * w[i + 1, j] * t1, 0.0)
+        u = across + (bt2 * wb - at2 * wa) - w[i, j + 1] * old_n1 - w[i + 1, j + 1] * old_t1
+        known = old_t2 - mass_t2 * (u - w[j, j + 1] * old_n2)
+        known = known - mass_t2 * w[i, j + 1] * n1 - mass_t2 * w[i + 1, j + 1] * t1
+        t2 = into_interval(known - mass_t2 * w[j, j + 1] * n2, two[FRICTION] * n2)
     else:
-        n2 = max(old_n2 - relaxed * rest - relaxed * w[i, j] * n1, 0.0)
+        n2 = max(old_n2 - mass_n2 * u - mass_n2 * w[i, j] * n1, 0.0)
     one[PN], one[PT], two[PN], two[PT] = n1, t1, n2, t2
     pn1, pn2, pt1, pt2 = n1 - old_n1, n2 - old_n2, t1 - old_t1, t2 - old_t2
     px, py = (pn1 + pn2) * nx - pt1 * ny, (pn1 + pn2) * ny + pt1 * nx

@@ -98,15 +98,15 @@ def set_speed(bodies: Bodies, manifolds: Manifolds, m: int, p: int, u: Vector, o
     before does not guess this step's, nor this one the next (E9).
     """
     a, b = manifolds.body_a[m], manifolds.body_b[m]
-    push = load_speed(bodies, manifolds, m, p, options.dt)
+    by_loads = load_speed(bodies, manifolds, m, p, options.dt)
     if options.certified:
         moving = length(point_velocity(bodies, a, row(manifolds.arm_a[m], p, 0)))
         moving += length(point_velocity(bodies, b, row(manifolds.arm_b[m], p, 0)))
         # Bodies stand still to each other below this: loads elsewhere leave as much where none act.
         still = STILL * min(bodies.extent[a], bodies.extent[b]) / options.dt
-        manifolds.speed[m, p] = max(max(length(u), push), max(SPEED_SHARE * moving, still))
-    manifolds.impact[m, p] = 1 if abs(u[2]) > push else 0
-    if u[2] > push:
+        manifolds.speed[m, p] = max(max(length(u), by_loads), max(SPEED_SHARE * moving, still))
+    manifolds.impact[m, p] = 1 if abs(u[2]) > by_loads else 0
+    if u[2] > by_loads:
         for k in range(3):
             manifolds.impulse[m, p, k] = 0.0
 

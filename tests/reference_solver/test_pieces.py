@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Settings, Simulation, Sphere
-from reference_solver.pieces import FIFTH_ORDER, FORCES, FROZEN, IMPACT, ROCKING
+from reference_solver.pieces import FORCES, FROZEN, IMPACT, ROCKING, TURNING
 
 DT, G = 1.0 / 60.0, 9.81
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
@@ -50,7 +50,7 @@ def test_velocities_explained_by_joined_pieces(dimension):
     assert then.pieces.step.min() == 18 and then.pieces.begin[0] == pytest.approx(18 * DT, abs=1e-15)
     pieces, last = first.pieces, {}
     assert set(pieces.kind) == {FORCES, IMPACT}
-    assert set(pieces.scheme) <= {FROZEN, FIFTH_ORDER, ROCKING}
+    assert set(pieces.scheme) <= {FROZEN, TURNING, ROCKING}
     owner = np.repeat(np.arange(len(pieces)), np.diff(pieces.first_body))
     for i in (1, 2, 3):  # each has its pieces, of the island it is in
         assert pieces.length[owner[pieces.body == i]].sum() == pytest.approx(18 * DT, abs=1e-13)

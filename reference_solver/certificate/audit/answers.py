@@ -39,7 +39,7 @@ from reference_solver.certificate.audit.sharing import (
 )
 from reference_solver.exact_contact import non_negative_least_squares
 from reference_solver.model import Array
-from reference_solver.pieces import CHAIN, FIFTH_ORDER, FROZEN
+from reference_solver.pieces import CHAIN, FROZEN, TURNING
 
 #: Modes of one cluster up to which all are tried: four planar contacts that stick have 256, four in space 1296.
 MOST = 1300
@@ -168,7 +168,7 @@ def _instants(run: Run) -> _Instants:
     closed = u[:, 0] <= HELD * speed + noise
     _, pair = np.unique((owner * len(run.free) + a) * len(run.free) + b, return_inverse=True)
     met = np.bincount(pair, closed) > 0.0
-    exact = np.where(run.is_impact, pieces.scheme != CHAIN, np.isin(pieces.scheme, (FROZEN, FIFTH_ORDER)))
+    exact = np.where(run.is_impact, pieces.scheme != CHAIN, np.isin(pieces.scheme, (FROZEN, TURNING)))
     after = np.einsum("cj,ckj->ck", run.meeting_velocity(after=True), axes)
     approach, change = np.zeros((2, len(pieces.begin)))
     np.maximum.at(approach, owner, -u[:, 0])

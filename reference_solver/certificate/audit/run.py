@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from reference_solver.geometry import reach, rotation
 from reference_solver.model import Array, Body, Model
-from reference_solver.pieces import CHAIN, FIFTH_ORDER, FORCES, IMPACT, ROCKING, Pieces
+from reference_solver.pieces import CHAIN, FORCES, IMPACT, ROCKING, TURNING, Pieces
 from reference_solver.shapes import smallest_extent
 
 Indices = NDArray[np.int64]
@@ -156,7 +156,7 @@ class Run:
     @cached_property
     def is_frozen(self) -> NDArray[np.bool_]:
         """(p,) whether rows of the contacts stood still in a piece: all but phases of fifth order."""
-        return np.asarray((self.pieces.length == 0.0) | (self.pieces.scheme != FIFTH_ORDER))
+        return np.asarray((self.pieces.length == 0.0) | (self.pieces.scheme != TURNING))
 
     @cached_property
     def is_rocking(self) -> NDArray[np.bool_]:

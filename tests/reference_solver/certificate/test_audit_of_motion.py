@@ -8,7 +8,7 @@ import pytest
 from reference_solver import Body, Box, Capsule, Disc, HalfSpace, Model, Settings, Simulation, Sphere
 from reference_solver.certificate.audit import CHECKS, audit, energy, space
 from reference_solver.certificate.audit.run import Run
-from reference_solver.pieces import FIFTH_ORDER, FROZEN
+from reference_solver.pieces import FROZEN, TURNING
 from tests.verification import self_test
 from tests.verification.known import gates
 
@@ -153,7 +153,7 @@ def test_parts_of_even_turns_alone():
     record = Simulation(model, Settings.reference(dt)).record(3, pieces=True)
     pieces = record.pieces
     assert (pieces.scheme == FROZEN).all() and (np.linalg.norm(pieces.impulse, axis=1) > 0.0).all()
-    bends = replace(pieces, scheme=np.full_like(pieces.scheme, FIFTH_ORDER))
+    bends = replace(pieces, scheme=np.full_like(pieces.scheme, TURNING))
     counts = [len(space._path(Run(model, each, dt), 1, record.pose[0]).begin) for each in (pieces, bends)]
     assert counts == [3 * 10, 3]
 

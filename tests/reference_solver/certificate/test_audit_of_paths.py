@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from reference_solver import Body, Box, Disc, HalfSpace, Model, Polygon, Settings, Simulation
 from reference_solver.certificate.audit import audit
-from reference_solver.pieces import FIFTH_ORDER
+from reference_solver.pieces import TURNING
 from tests.verification import self_test
 
 G = 9.81
@@ -117,7 +117,7 @@ def test_post_beside_a_falling_block_by_a_millionth(seed):
     steps, dt = round(60 * time), time / round(60 * time)
     scene = self_test.Scene(model, steps, Settings.reference(dt))
     pieces = self_test.obstacle(lambda size: (0.0, -9.0))(scene, 0.0)[1].pieces
-    turning = np.flatnonzero(pieces.scheme == FIFTH_ORDER)
+    turning = np.flatnonzero(pieces.scheme == TURNING)
     piece = turning[4 * len(turning) // 5]
     middle, close = pieces.begin[piece] + 0.5 * pieces.length[piece], 200
     fine = Simulation(model, Settings.reference(middle / close)).record(close + 1).pose[:, 1]

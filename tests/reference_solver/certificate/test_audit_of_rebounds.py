@@ -8,7 +8,7 @@ import pytest
 
 from reference_solver import Body, Box, Model, Settings, Simulation
 from reference_solver.certificate.audit import audit
-from reference_solver.pieces import FIFTH_ORDER
+from reference_solver.pieces import TURNING
 from tests.verification import self_test
 from tests.verification.known import gates
 
@@ -32,7 +32,7 @@ def test_parting_at_the_begin_of_a_pressed_phase():
     pieces, before = record.pieces, record.pieces.twist_before.copy()
     contact = len(pieces.body_a) // 2
     piece = int(np.searchsorted(pieces.first_contact, contact, "right")) - 1
-    assert pieces.scheme[piece] == FIFTH_ORDER
+    assert pieces.scheme[piece] == TURNING
     assert "normal" not in refused(motion.model, record, dt)
     before[pieces.first_body[piece + 1] - 1, :3] += 1e-6 * pieces.normal[contact]
     assert "normal" in refused(motion.model, replace(record, pieces=replace(pieces, twist_before=before)), dt)

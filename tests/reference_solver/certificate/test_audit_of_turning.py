@@ -9,7 +9,7 @@ from reference_solver import Body, HalfSpace, Model, Settings, Simulation, Spher
 from reference_solver.certificate.audit import audit
 from reference_solver.certificate.audit.run import Run
 from reference_solver.certificate.audit.turning import UNKNOWN_CHANGE, _largest_turn, changes_of_force, turns_beside
-from reference_solver.pieces import FIFTH_ORDER, FORCES, Pieces
+from reference_solver.pieces import FORCES, TURNING, Pieces
 from tests.verification import self_test
 from tests.verification.known import gates
 
@@ -27,7 +27,7 @@ def run_of(lengths, forces=None, begin=None, contacts=1, twist=(0.0,) * 6):
     pose, normal = np.tile([0.0, 0.0, 0.5, *UPRIGHT], (p, 1)), np.tile([0.0, 0.0, 1.0], (c, 1))
     pieces = Pieces(
         step=np.arange(p), begin=begin, length=lengths,
-        kind=np.full(p, FORCES), scheme=np.full(p, FIFTH_ORDER),
+        kind=np.full(p, FORCES), scheme=np.full(p, TURNING),
         first_body=np.arange(p + 1), first_contact=contacts * np.arange(p + 1),
         body=np.ones(p, np.int64), pose_before=pose, twist_before=np.tile(twist, (p, 1)), pose_after=pose,
         twist_after=np.tile(twist, (p, 1)), body_a=np.zeros(c, np.int64), body_b=np.ones(c, np.int64),
