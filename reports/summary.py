@@ -207,7 +207,9 @@ def _nothing_wrong(rows: Sequence[Plain]) -> str:
         return "Nothing was judged: no check of this run has a finite tolerance"
     if any(row["physics"] != "pass" for row in judged):
         return "Only checks at other iteration counts fail or have no value"
-    return ". ".join(filter(None, ("Every check passes", unstated(rows))))
+    refused = sum(row["outcome"] == "refused" and row["tolerance"] is not None for row in rows)
+    passes = f"Every check passes that was judged; {refused} are REFUSED" if refused else "Every check passes"
+    return ". ".join(filter(None, (passes, unstated(rows))))
 
 
 def _where(

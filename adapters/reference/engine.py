@@ -181,10 +181,11 @@ class ReferenceEngine(Engine):
         self, settings: Mapping[str, Any], certificate: Mapping[str, Any]
     ) -> list[Mapping[str, Any]]:
         """See `Engine.at_other_tolerances`: a tenth of the tolerance and ten times it."""
-        from reference_solver.certificate.truth import TOLERANCES
+        from reference_solver.certificate.truth import tolerances_beside
 
-        shares = () if certificate.get("closed", True) else TOLERANCES  # steps have none
-        return [{**settings, "tolerance": share * settings["tolerance"]} for share in shares]
+        if certificate.get("closed", True):  # steps have none
+            return []
+        return [{**settings, "tolerance": each} for each in tolerances_beside(settings["tolerance"])]
 
     def declares(self, profile: str, needs: Needs, dt: float) -> dict[str, Declared]:
         """Friction of a rebounding box in 3-D with fixed sweeps; all else is exact in both profiles.

@@ -181,7 +181,7 @@ SERIES_ENDS, SERIES_STEPS = 1e-11, 100.0
 def certify(model: Model, settings: Settings, steps: int, stride: int = 1, others: Sequence[Array] = ()) -> Certificate:
     """Run ``model`` and certify the run; costs seven runs, five if all motion is in closed form, and the audit.
 
-    ``others``: poses (s, n, 3 | 7) of the runs to `SHARES` of the tolerance, which else are made here.
+    ``others``: poses (s, n, 3 | 7) of the runs to `tolerances_beside` its own, which else are made here.
 
     Raises
     ------
@@ -244,6 +244,11 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1, other
     if horizon < record.t[-1]:
         reasons.append(beyond)
     return replace(found, holds=holds, reasons=tuple(reasons))
+
+
+def tolerances_beside(tolerance: float) -> list[float]:
+    """Return a tenth of a tolerance and ten times it, as far as these may be set."""
+    return [min(max(share * tolerance, TOLERANCES[0]), TOLERANCES[1]) for share in SHARES]
 
 
 def _open_at_start(model: Model) -> tuple[float, float]:
@@ -408,8 +413,8 @@ def _error(model: Model, run: Simulation, record: Record, steps: int, stride: in
     assert settings.tolerance is not None
     error = distance(model, record.pose, _mirrored(model, settings, steps, stride))
     if not (run.is_closed or others):
-        tolerances = [min(max(share * settings.tolerance, TOLERANCES[0]), TOLERANCES[1]) for share in SHARES]
-        others = [poses_of(model, replace(settings, tolerance=each), steps, stride) for each in tolerances]
+        beside = tolerances_beside(settings.tolerance)
+        others = [poses_of(model, replace(settings, tolerance=each), steps, stride) for each in beside]
     for other in others:
         error = np.maximum(error, 2.0 * distance(model, record.pose, other))
     return _with_ends(model, record, settings.dt, error)

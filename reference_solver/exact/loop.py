@@ -39,6 +39,9 @@ INSTANT = 4e-10
 FIRST_STEP, ORDER = 0.1, 8.0
 #: Modes that end while others go on: forces do not jump there.
 GO_ON = {Kind.LIFT: OPEN, Kind.SLIP: SLIP}
+#: Angle that a body in space may turn by in a step, at the spin with which it begins [rad]. Turns are rotation vectors,
+#: which have no rates at a whole turn.
+TURN = 2.0
 #: Share of the tolerance that is asked for where a body that turns touches nothing: free rotation is known to nearly
 #: round-off.
 FREE = 1e-2
@@ -190,7 +193,10 @@ class Loop:
                 return piece
             self.next_length = FIRST_STEP * self.world.time * (self.tolerance / TOLERANCE) ** (1.0 / ORDER)
         self.steps += 1
-        length = min(self.next_length, self.longest)
+        d, length = self.world.dimension, min(self.next_length, self.longest)
+        spin = np.linalg.norm(self.state.velocity[:, d:], axis=1).max()
+        if d == 3 and spin * length > TURN:
+            length = TURN / float(spin)
         piece, self.next_length = step(self.world, self.state, held, self._tolerance_of(held), length)
         return piece
 

@@ -88,7 +88,7 @@ def relax_point(bodies: Bodies, rows: Rows, c: int, row: int, options: Options, 
 
 @spliced_kernel
 def solve_point(rows: Rows, c: int, options: Options) -> None:
-    """Exact solution of one contact point (E11): open, sticking, or sliding either way."""
+    """Exact solution of one contact point (E12): open, sticking, or sliding either way."""
     p, u = rows.local[IMPULSE], rows.local[VELOCITY]
     kn, kt, kx = 1.0 / rows.real[c, NORMAL_MASS], 1.0 / rows.real[c, TANGENT_MASS], rows.real[c, COUPLING]
     qn = u[0] - kn * p[0] - kx * p[1]

@@ -134,7 +134,7 @@ def try_mode(w: Array, local: Array, mu1: float, mu2: float, first: int, second:
 
 @spliced_kernel
 def coulomb_point(qn: float, qt: float, kn: float, kt: float, kx: float, mu: float) -> tuple[float, float]:
-    """Normal and tangential impulse of one point (E11), q the velocities (minus target) without them.
+    """Normal and tangential impulse of one point (E12), q the velocities (minus target) without them.
 
     Where several modes fit, the first of open, stick, slide; where none does, contact without friction.
     """

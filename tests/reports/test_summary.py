@@ -353,7 +353,8 @@ def test_refusal_of_a_file(tmp_path, monkeypatch):
     text = " ".join(" ".join(shown(rows, 100)).split())
     assert text.count("the normal is not unique: 9e-8") == 1 == as_markdown(rows).count("the normal is not unique: 9e")
     assert "REFUSED: reference/reference ball.toml: the normal is not unique: 9e-8" in text
-    assert "Every check passes" in text and "fail," not in text and "Needs attention" not in text
+    assert "Every check passes that was judged; 2 are REFUSED" in text
+    assert "fail," not in text and "Needs attention" not in text
     assert not any(is_alarming(each) for each in rows) and families(rows) == []
     junit = as_junit(rows)
     assert "<failure" not in junit and junit.count("<skipped") == 2

@@ -107,9 +107,9 @@ class Springs:
         """One step: contacts at its start, driven bodies where it ends."""
         self.steps += 1
         for k in self.driven:
-            body = self.scene.bodies[k]
-            self.place[:, k] = place_after(body, self.steps * self.seconds)
-            self.twist[:, k, :3] = velocity_over(body, self.seconds, self.steps - 1)
+            driven = self.scene.bodies[k]
+            self.place[:, k] = place_after(driven, self.steps * self.seconds)
+            self.twist[:, k, :3] = velocity_over(driven, self.seconds, self.steps - 1)
         force = self.load.copy()
         for a, b, mu in self.pairs:
             normal, arms, gap = self._touch(a, b)
@@ -135,7 +135,7 @@ class Springs:
         spin = turned(turn, spin + self.dt * (torque - np.cross(spin, self.inertia * spin)) / self.inertia)
         w, u = turn[..., :1], turn[..., 1:]
         rate = np.concatenate([-(spin * u).sum(-1, keepdims=True), spin * w + np.cross(spin, u)], axis=-1)
-        turn = turn + rate * (self.dt / 2)
+        turn += rate * (self.dt / 2)
         twist[..., 3:] = spin * self.kept
         self.turn[:, self.free] = turn / np.linalg.norm(turn, axis=-1, keepdims=True)
         self.twist[:, self.free] = twist
@@ -153,10 +153,10 @@ class Springs:
                 arm = turned(self.turn[:, b, None], CORNERS * _singles(second.half_extents))
             else:
                 arm = np.broadcast_to(-normal * self.reach[b], between.shape)
-            gap = ((self.place[:, b, None] + arm) @ normal - np.float32(first.offset))[..., None]
+            gap = _singles((self.place[:, b, None] + arm) @ normal - np.float32(first.offset))[..., None]
             deepest = np.argsort(gap, axis=1, kind="stable")[:, :4]
             arm, gap = np.take_along_axis(arm, deepest, 1), np.take_along_axis(gap, deepest, 1)
-            return np.broadcast_to(normal, arm.shape), (between + arm - gap * normal, arm), gap
+            return np.broadcast_to(normal, arm.shape), (_singles(between + arm - gap * normal), arm), gap
         if isinstance(first, Box):
             half, turn = _singles(first.half_extents), self.turn[:, a, None]
             local = turned(turn * BACK, between)
@@ -167,7 +167,7 @@ class Springs:
             away, sign = turned(turn, local - near), np.where(inside, -1, 1)
             start = turned(turn, near)
         else:
-            away, sign, start = between, 1, np.zeros_like(between)
+            away, sign, start = between, np.ones(1, np.float32), np.zeros_like(between)
         far = np.linalg.norm(away, axis=-1, keepdims=True)
         normal = sign * away / np.maximum(far, NONE)
         own, other = (shape.radius if isinstance(shape, Sphere) else 0.0 for shape in (first, second))

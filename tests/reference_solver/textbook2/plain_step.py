@@ -30,6 +30,12 @@ class Contact:
     gap: float
     restitution: float
     friction: float
+    target: float = 0.0  # of u_n [m/s]
+    push_target: float = 0.0  # of the pseudo-velocity [m/s]
+    is_impact: bool = False
+    p_n: float = 0.0  # impulses of this step [N s]
+    p_t: float = 0.0
+    p_push: float = 0.0
 
     def __post_init__(self):
         self.tangent = np.array([-self.normal[1], self.normal[0]])
