@@ -3,6 +3,7 @@
 import inspect
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from driven import FLOOR, driven, measured_of, struck
 
@@ -217,3 +218,12 @@ def test_speeds_of_vbd_as_differences_of_places(name, params):
     """A place of a metre is rounded to 6e-8 m, a speed to that over the step: a smaller one is worse."""
     coarse, fine = (error(name, 2, params, "acceleration", dt) for dt in (DT, DT / 4))
     assert fine > 4.0 * coarse
+
+
+@pytest.mark.parametrize(("profile", "back"), [("default", 2e-4), ("tuned", 1e-6)])
+def test_vbd_box_that_stays_where_it_stops(profile, back):
+    """It slides a tenth of a metre; as shipped its springs draw it back by a tenth of a millimetre, where it lies."""
+    _, drive = driven(ENGINES[1], profile, 1 / 600)
+    found = drive(sliding(1.0, duration=1.0))
+    assert found.pose[-1, 1, 0] > 0.1 and np.ptp(found.pose[-120:, 1, 0]) < 1e-6
+    assert found.pose[:, 1, 0].max() - found.pose[-1, 1, 0] < back
