@@ -9,6 +9,7 @@ from driven import FLOOR, driven, measured_of, struck
 
 from adapters.conformance import items
 from adapters.law import metric_of
+from adapters.law.single_precision import UNIT
 from adapters.newton import shipped
 from adapters.newton.kamino import KaminoEngine, profiles
 from adapters.newton.kamino import laws as kamino
@@ -177,6 +178,21 @@ def test_kamino_blows_by_the_law_of_their_overlap(name, params, metric, profile)
     (law,) = [x for x in kamino.DEVIATIONS if (x.scene, x.profiles, metric_of(x.metric)) == (name, (profile,), metric)]
     said, band = law.says(canonical.scene(3, params), DT, canonical.measure)
     assert band < 0.02 and abs(measured_of(ENGINES[0], name, profile, 3, params)[metric] - said) <= band
+
+
+@pytest.mark.parametrize(
+    ("name", "profile", "dimension", "params", "metric", "size"),
+    [("bounce", "default", 2, {"e": 1}, "apex_growth", 1.0), ("rod_gas", "dvi", 2, {}, "astray", 5.0),
+     ("cradle", "default", 2, {"n": 3, "apart": 0}, "energy_defect", 2.0),
+     ("edge_drop", "tuned", 3, {"e": 1, "tilt": 30}, "twisted", 1.0),
+     ("oblique", "dvi", 2, {"v": 1, "spin": -10, "mu": 1}, "forward_speed", 2.6)],
+)  # fmt: skip
+def test_kamino_round_off_of_each_step(name, profile, dimension, params, metric, size):
+    """At most what each step rounds of places and speeds of this size [m, m/s], added up over all steps."""
+    canonical = CATALOGUE[name]
+    scene = canonical.scene(dimension, params)
+    off = measured_of(ENGINES[0], name, profile, dimension, params)[metric] - canonical.exact(scene).get(metric, 0.0)
+    assert 0.0 < abs(off) < size * UNIT * scene.duration / DT
 
 
 # ---- VBD -------------------------------------------------------------------------------------------------------------

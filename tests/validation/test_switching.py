@@ -119,6 +119,13 @@ MEASURED_ONLY = {
         "tilt-table-friction-of-a-sweep",
         "tilt-table-of-a-step",
     },
+    "newton_kamino": {
+        "bounce-in-singles",
+        "cradle-in-singles",
+        "edge-drop-in-singles",
+        "oblique-in-singles",
+        "rod-gas-in-singles",
+    },
     "newton_semi_implicit": {"far-origin-in-singles", "ladder-shaken", "rocker-springs"},
     "physx": {
         "closing-wall-places-in-singles",
