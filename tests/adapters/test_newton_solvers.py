@@ -221,7 +221,7 @@ def error(name, dimension, params, metric, dt):
     [("rolling_spin", 3, {"spin": 10, "v": 1}, "astray"), ("rolling_spin", 3, {"spin": 10, "v": 1}, "spin"),
      ("masse", 3, {"side": 1, "back": 4}, "final_vx"), ("hilltop", 2, {"mu": 0.5}, "leaving_angle"),
      ("rocker", 2, {"tilt": 5}, "amplitude"), ("pivot", 2, {"from": 1, "to": 30}, "passing_time"),
-     ("slide_to_roll", 3, {"mu": 0.1}, "final_speed")],
+     ("slide_to_roll", 3, {"mu": 0.1}, "final_speed"), ("roll_incline", 2, {"ratio": 0.5}, "turning")],
 )  # fmt: skip
 def test_errors_of_vbd_by_the_step(name, dimension, params, metric):
     """Of the order of a step: half of it leaves about half."""
@@ -229,11 +229,21 @@ def test_errors_of_vbd_by_the_step(name, dimension, params, metric):
     assert 0.0 < fine < 0.62 * coarse
 
 
-@pytest.mark.parametrize(("name", "params"), [("incline", {"ratio": 2}), ("pressed_box", {"load": 0, "shear": 0.8})])
+@pytest.mark.parametrize(
+    ("name", "params"),
+    [("incline", {"ratio": 2}), ("pressed_box", {"load": 0, "shear": 0.8}), ("tilt_table", {"ratio": 1.1, "aspect": 1})],
+)
 def test_speeds_of_vbd_as_differences_of_places(name, params):
     """A place of a metre is rounded to 6e-8 m, a speed to that over the step: a smaller one is worse."""
     coarse, fine = (error(name, 2, params, "acceleration", dt) for dt in (DT, DT / 4))
     assert fine > 4.0 * coarse
+
+
+@pytest.mark.parametrize("profile", ENGINES[1].profiles)
+def test_vbd_box_far_out_without_motion(profile):
+    """A way of 12.5 mm in a step is less than the spacing of places, 0.125 m: none is kept, and nothing brakes."""
+    found = measured_of(ENGINES[1], "far_origin", profile, 2, {"far": 2.0**20})
+    assert found["braking"] == found["stopping_distance"] == 0.0
 
 
 @pytest.mark.parametrize(("profile", "back"), [("default", 2e-4), ("tuned", 1e-6)])
