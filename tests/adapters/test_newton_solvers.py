@@ -231,7 +231,11 @@ def test_errors_of_vbd_by_the_step(name, dimension, params, metric):
 
 @pytest.mark.parametrize(
     ("name", "params"),
-    [("incline", {"ratio": 2}), ("pressed_box", {"load": 0, "shear": 0.8}), ("tilt_table", {"ratio": 1.1, "aspect": 1})],
+    [
+        ("incline", {"ratio": 2}),
+        ("pressed_box", {"load": 0, "shear": 0.8}),
+        ("tilt_table", {"ratio": 1.1, "aspect": 1}),
+    ],
 )
 def test_speeds_of_vbd_as_differences_of_places(name, params):
     """A place of a metre is rounded to 6e-8 m, a speed to that over the step: a smaller one is worse."""
