@@ -227,7 +227,7 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1, other
     error += COORDINATE_UNITS * np.spacing(place) * (1.0 + met) * (1.0 + np.minimum(growth, GROWTH))
     within = record.t < horizon
     if not np.isfinite(error[within]).all():
-        reasons.append("the run at another tolerance is no numbers")
+        reasons.append("mirrored or to another tolerance, the event loop refuses it before its end")
     # A difference of two motions that obey the laws grows as that disturbance does, and what all runs are off by.
     slips = slips_taken_out(model, record, settings.dt)
     joint = joint_blows(model, record, settings.dt, no_gap(world_of(model), place))
