@@ -25,7 +25,10 @@ def write(path: Path, content: str | bytes) -> None:
 
 
 def cache_folder() -> Path:
-    """Folder for data that can be made again (`reference_solver.caches`)."""
-    from reference_solver.caches import base_folder
+    """Folder for data that can be made again, as in `reference_solver.caches`.
 
-    return base_folder()
+    It stands in both because results of an engine that imports the solver are stale after each edit of the solver.
+    """
+    if os.name == "nt" and os.environ.get("LOCALAPPDATA"):
+        return Path(os.environ["LOCALAPPDATA"]) / "contact-crosscheck"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "contact-crosscheck"
