@@ -27,7 +27,7 @@ def write(path: Path, content: str | bytes) -> None:
 def cache_folder() -> Path:
     """Folder for data that can be made again, as in `reference_solver.caches`.
 
-    It stands in both because results of an engine that imports the solver are stale after each edit of the solver.
+    Both have it: results of an engine that imports the solver are stale after each edit of the solver.
     """
     if os.name == "nt" and os.environ.get("LOCALAPPDATA"):
         return Path(os.environ["LOCALAPPDATA"]) / "contact-crosscheck"

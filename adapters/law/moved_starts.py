@@ -1,4 +1,4 @@
-"""Laws of balls that run from several starts, which differ by round-off: how far, and when nothing is predicted.
+"""Laws of motions from several starts, which differ by round-off: how far, and when nothing is predicted.
 
 A contact found a step later or earlier is a jump, so that round-off of a gap decides on a motion. Where the motions
 from starts moved by it differ, the band is as wide as they do, or there is no prediction.
@@ -6,7 +6,14 @@ from starts moved by it differ, the band is as wide as they do, or there is no p
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from types import MappingProxyType
+
+from adapters.law import Law, Measure, Prediction
+from adapters.law.single_precision import ROUNDINGS, UNIT, Held
 from adapters.scene import Scene
+from adapters.trajectory import Measured, Trajectory
 
 #: Round-off of a gap [m]: of heights of some metres, each rounded to 2e-15 m, added up over a thousand steps.
 GAP_ROUND_OFF = 1e-14
@@ -16,6 +23,8 @@ PERTURBATIONS = (-3.0, -1.0, 1.0, 3.0)
 SPREAD_FACTOR = 10.0
 #: A metric that changes by more than this share of its scale is not predicted.
 BLURRED = 1e-4
+#: The same share where places are in single precision.
+EITHER = 1e-2
 #: Round-off of up to a thousand additions, relative to the scale of a metric.
 SUM_ROUND_OFF = 1e-12
 
@@ -26,3 +35,31 @@ def scale_of(scene: Scene, metric: str) -> float:
         return scene.params["height"]
     speed = scene.params.get("v", 1.0)
     return {"rebound_speed": speed, "velocity_change": speed, "impulse": scene.bodies[1].mass * speed}.get(metric, 1.0)
+
+
+def law_of_motions(
+    motions: Callable[[Scene, float, str], list[Trajectory]], blurred: Mapping[str, float] = MappingProxyType({})
+) -> Callable[[str, str], Law]:
+    """Laws by metric and profile, of motions in single precision from all starts, the unmoved one first.
+
+    They predict what the first measures, and how far the others are from it. ``blurred``: differences up to which a
+    metric is predicted, where that is not the share `EITHER` of its value.
+    """
+
+    @lru_cache(maxsize=4)
+    def measured(key: Held, dt: float, profile: str, measure: Measure) -> list[dict[str, Measured]]:
+        return [measure(key.scene, motion) for motion in motions(key.scene, dt, profile)]
+
+    def law_of(metric: str, profile: str) -> Law:
+        def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
+            found = [told.get(metric, (None, ""))[0] for told in measured(Held(scene), dt, profile, measure)]
+            known = [value for value in found if value is not None]
+            if not known or len(known) < len(found):
+                return None
+            spread, scale = max(abs(value - known[0]) for value in known), max(1.0, abs(known[0]))
+            most = blurred.get(metric, EITHER * scale)
+            return (known[0], 2.0 * spread + ROUNDINGS * UNIT * scale) if spread <= most else None
+
+        return law
+
+    return law_of

@@ -112,7 +112,7 @@ class Problem:
 
     @cached_property
     def _parts(self) -> list[tuple[Indices, Problem]]:
-        """Numbers and problem of each group of contacts; groups share no free body. Empty if there is one group."""
+        """Numbers and problem of each group of contacts that share no free body with others. Empty for one group."""
         groups, free = self.contacts.groups, self.free.reshape(len(self.contacts), -1)
         return [
             (each, Problem(self.contacts.chosen(each), free[each].ravel(), self.slips[each], self.size))

@@ -152,7 +152,7 @@ class Recorder:
     def contacts(self, parts: Sequence[Part | Blow]) -> Handed:
         """Return the contacts of a step as a simulation hands them out.
 
-        Each stands there once, with gap, point and normal as it was first, and the sum of its impulses in all parts.
+        Each is listed once, with the sum of its impulses of all parts, and gap, point and normal of its first part.
         """
         found = [
             part.acting if isinstance(part, Blow) else Acting.between(part.piece, *np.array(part[1:])[:, None])[0]

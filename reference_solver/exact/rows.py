@@ -182,7 +182,7 @@ class Contacts:
         return np.asarray((self.matrices[1] @ forces.ravel()).reshape(self.world.shape))
 
     def along_axes(self, forces: Array) -> Array:
-        """Return in world axes the forces (m, d) that are told along the frames, in their unit."""
+        """Return forces (m, d) in world axes, from their components along the frames; same unit."""
         return np.asarray(np.einsum("mk,mkp->mp", forces, self.rows.frame))
 
     @property

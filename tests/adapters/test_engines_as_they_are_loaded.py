@@ -19,7 +19,7 @@ class Bare(Engine):
     """An engine of which nothing is wrong; its facts belong to the class."""
 
     facts = FACTS
-    profiles = {"default": lambda needs, dt: []}  # noqa: RUF012
+    profiles = {"default": lambda needs, dt: []}  # noqa: RUF012 (a fake for one test)
 
     def version(self):
         return "1.2\nand more"
@@ -98,7 +98,7 @@ def test_object_that_is_no_engine_with_reason_and_traceback(monkeypatch, kind, r
 )
 def test_visible_profile_name_of_limited_length(monkeypatch, profile, good):
     class Named(Bare):
-        profiles = {profile: Bare.profiles["default"]}  # noqa: RUF012
+        profiles = {profile: Bare.profiles["default"]}  # noqa: RUF012 (a fake for one test)
 
     found = loaded(monkeypatch, Named)
     assert (found.engine is not None) is good and found.facts == FACTS

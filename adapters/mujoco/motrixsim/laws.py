@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from adapters.law import Deviation, Law, Measure, Prediction, deviations, settings_of
-from adapters.law.moved_starts import PERTURBATIONS, scale_of
+from adapters.law.moved_starts import EITHER, PERTURBATIONS, scale_of
 from adapters.law.single_motions import corner_law, rounded_motions, standstills
 from adapters.law.single_precision import PLACES, ROUNDINGS, UNIT, Method, plane_law, rounded_law
 from adapters.law.unswept import passing_law
@@ -37,8 +37,6 @@ SPRINGS: Mapping[str, tuple[str, ...]] = {
     "bounce": (*(f"apex[{n}]" for n in range(1, 6)), "apex_interval_ratio", "apex_growth", "rest_time"),
     "head_on": BLOWS["head_on"][:-1],
 }
-#: Part of a metric's scale by which moved starts may change it for a prediction.
-EITHER = 1e-2
 
 
 def spring_law(metric: str, profile: str) -> Law:

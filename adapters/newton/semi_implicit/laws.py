@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 
-from adapters.law import Deviation, Law, Measure, Prediction, deviations, settings_of
+from adapters.law import Deviation, deviations, settings_of
+from adapters.law.moved_starts import law_of_motions
 from adapters.law.single_motions import standstills
-from adapters.law.single_precision import ROUNDINGS, UNIT, Held
 from adapters.newton.semi_implicit.motion import motions
 from adapters.newton.semi_implicit.profiles import PROFILES
-from adapters.scene import Scene
-from adapters.trajectory import Measured
 
-#: Part of a value, or of a metre, a second and so on, by which moved starts may change it for a prediction.
-EITHER = 1e-2
-#: The same for the time of rest [s], whose last blow round-off may add or leave out.
+#: Difference up to which the time of rest is predicted [s]: round-off may add a last blow, or leave it out.
 LAST = 0.1
 #: Metrics by scene: balls and boxes on planes, where round-off does not decide on the motion.
 ROWS: Mapping[str, str] = {
@@ -52,35 +47,13 @@ ROWS: Mapping[str, str] = {
 }
 
 
-@lru_cache(maxsize=4)
-def _measured(key: Held, dt: float, profile: str, measure: Measure) -> list[dict[str, Measured]]:
-    chosen = settings_of(PROFILES[profile], key.scene, dt)
-    return [measure(key.scene, motion) for motion in motions(key.scene, dt, chosen)]
-
-
-def spring_law(metric: str, profile: str) -> Law:
-    """What a motion of springs measures, and how far motions from starts that differ by round-off are from it."""
-
-    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        found = [told.get(metric, (None, ""))[0] for told in _measured(Held(scene), dt, profile, measure)]
-        known = [value for value in found if value is not None]
-        if not known or len(known) < len(found):
-            return None
-        spread, scale = max(abs(value - known[0]) for value in known), max(1.0, abs(known[0]))
-        return (
-            (known[0], 2.0 * spread + ROUNDINGS * UNIT * scale)
-            if spread <= (LAST if metric == "rest_time" else EITHER * scale)
-            else None
-        )
-
-    return law
-
-
 DEVIATIONS: tuple[Deviation, ...] = deviations(
     "newton_semi_implicit",
     PROFILES,
     {scene: metrics.split() for scene, metrics in ROWS.items()},
-    spring_law,
+    law_of_motions(
+        lambda scene, dt, profile: motions(scene, dt, settings_of(PROFILES[profile], scene, dt)), {"rest_time": LAST}
+    ),
     "contacts are springs of 2.5 kN/m with dampers of 100 N s/m, in explicit steps, whatever the mass and e; friction "
     "is a damper of 1 kN s/m up to its cone; spins are damped; places are in single precision",
     "semi_implicit/kernels_contact.py, _eval_body_contact; motion in adapters/newton/semi_implicit/motion.py",

@@ -56,10 +56,9 @@ def motions(scene: Scene, dt: float, chosen: Mapping[str, Any]) -> list[Trajecto
 
 
 def met(scene: Scene) -> list[tuple[int, int]]:
-    """Pairs of bodies that may touch, in the order of `KINDS`."""
-    order = (HalfSpace, Box, Sphere)
-    found = [(i, j) for i, j, _ in scene.contact_pairs()]
-    return [tuple(sorted(pair, key=lambda k: order.index(type(scene.bodies[k].shape)))) for pair in found]  # type: ignore
+    """Pairs of bodies that may touch, in the order of `KINDS`; other shapes are last."""
+    order = [type(body.shape) for body in scene.bodies]
+    return [(i, j) if (order[i], order[j]) in KINDS else (j, i) for i, j, _ in scene.contact_pairs()]
 
 
 def _is_met(scene: Scene, i: int, j: int) -> bool:

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from adapters.engine import Array
-from adapters.law import Deviation, Law, Measure, Prediction, deviations, settings_of
+from adapters.law import Deviation, deviations, settings_of
+from adapters.law.moved_starts import law_of_motions
 from adapters.law.single_motions import standstills
-from adapters.law.single_precision import PLACES, ROUNDINGS, UNIT, Held
+from adapters.law.single_precision import PLACES, ROUNDINGS, UNIT
 from adapters.law.unswept import passing_law
 from adapters.newton.vbd.profiles import PROFILES
 from adapters.scene import Disc, HalfSpace, Scene, Sphere
 from adapters.stepping import step_count
-from adapters.trajectory import Measured, Trajectory
+from adapters.trajectory import Trajectory
 
 _RELEASES, _SOURCE = ("1.8.",), "vbd/rigid_vbd_kernels.py, update_body_velocity"
 #: Metrics by scene of one ball on a floor, and of two balls.
@@ -29,11 +28,9 @@ ROWS: Mapping[str, str] = {
 }
 #: Starts that differ by round-off, and by how many units of the roundings of a blow at most.
 STARTS, MOST = 9, 3
-#: Part of a value, or of a metre, a second and so on, by which moved starts may change it for a prediction.
-EITHER = 1e-2
 
 
-def motions(scene: Scene, dt: float, chosen: Mapping[str, Any]) -> list[Trajectory]:
+def motions(scene: Scene, dt: float, profile: str) -> list[Trajectory]:
     """Motions of two bodies on a line, one a ball, from all starts; none for other scenes.
 
     A step is implicit: ``m (v' - v) = dt (-k (x + dt v') - c min(v', 0))`` of the gap x where it would close, with the
@@ -42,7 +39,7 @@ def motions(scene: Scene, dt: float, chosen: Mapping[str, Any]) -> list[Trajecto
     """
     if len(scene.bodies) != 2 or any(any(body.force) or any(body.torque) for body in scene.bodies):
         return []
-    d, (first, ball) = scene.dimension, scene.bodies
+    d, (first, ball), chosen = scene.dimension, scene.bodies, settings_of(PROFILES[profile], scene, dt)
     if not isinstance(ball.shape, Disc | Sphere) or first.motion == "prescribed":
         return []
     if isinstance(first.shape, HalfSpace):
@@ -91,33 +88,13 @@ def motions(scene: Scene, dt: float, chosen: Mapping[str, Any]) -> list[Trajecto
     return found
 
 
-@lru_cache(maxsize=4)
-def _measured(key: Held, dt: float, profile: str, measure: Measure) -> list[dict[str, Measured]]:
-    chosen = settings_of(PROFILES[profile], key.scene, dt)
-    return [measure(key.scene, motion) for motion in motions(key.scene, dt, chosen)]
-
-
-def spring_law(metric: str, profile: str) -> Law:
-    """What an implicit spring measures, and how far motions from starts that differ by round-off are from it."""
-
-    def law(scene: Scene, dt: float, measure: Measure) -> Prediction | None:
-        found = [told.get(metric, (None, ""))[0] for told in _measured(Held(scene), dt, profile, measure)]
-        known = [value for value in found if value is not None]
-        if not known or len(known) < len(found):
-            return None
-        spread, scale = max(abs(value - known[0]) for value in known), max(1.0, abs(known[0]))
-        return (known[0], 2.0 * spread + ROUNDINGS * UNIT * scale) if spread <= EITHER * scale else None
-
-    return law
-
-
 DEVIATIONS: tuple[Deviation, ...] = ()
 for _profile, _rows in (("default", ROWS), ("tuned", BOUNCES)):
     DEVIATIONS += deviations(
         "newton_vbd",
         (_profile,),
         {scene: metrics.split() for scene, metrics in _rows.items()},
-        spring_law,
+        law_of_motions(motions),
         "contacts are springs with dampers in an implicit step, whatever the mass and e; velocities are differences of "
         "places in single precision",
         "vbd/rigid_vbd_kernels.py, evaluate_rigid_contact_from_collision; motion in adapters/newton/vbd/laws.py",

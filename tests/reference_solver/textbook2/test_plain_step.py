@@ -60,7 +60,7 @@ class Both:
 
 
 def pile(build):
-    """A column that stands in the floor, a disc that rolls, a box that falls; all are thrown against each other."""
+    """A column that stands in the floor, a disc that rolls, a box that falls; all meet."""
     return [
         build.floor(),
         build.box(0.0, 0.495, (0.3, 0.0, 0.0)),

@@ -23,7 +23,7 @@ class Port(port.PortEngine):
     """MuJoCo C that reads one setting otherwise."""
 
     facts = port.port_facts("port", "Port", "port", "single")
-    switches = {"friction is less stiff": {"impratio": 2.0}}  # noqa: RUF012
+    switches = {"friction is less stiff": {"impratio": 2.0}}  # noqa: RUF012 (a fake for one test)
 
     def __init__(self, **changes):
         self.changes = changes
