@@ -14,8 +14,13 @@ import pytest
 
 from adapters import registry
 from reference_solver import Body, Disc, HalfSpace, Model
-from reference_solver.exact.bodies import start_of, world_of
+from reference_solver.certificate.truth import Certificate
+from reference_solver.exact.bodies import Bodies, start_of, world_of
 from reference_solver.exact.loop import Loop
+from reference_solver.exact.motion import Piece
+from reference_solver.exact.problem import Answer, Problem
+from reference_solver.exact.rows import Rows
+from reference_solver.textbook2 import columns
 from reports import listing
 from reports.wording import number
 from validation import bounds
@@ -146,7 +151,7 @@ def test_every_equation_of_the_solver_is_stated_once():
 def test_snippets_of_the_solver_s_documents_run():
     names = (
         "reference_solver/README.md",
-        *(f"docs/solver/{name}.md" for name in ("certificate", "oracle", "verification", "loop")),
+        *(f"docs/solver/{name}.md" for name in ("certificate", "oracle", "verification", "loop", "step")),
     )
     made = {}
     for name in names:
@@ -159,6 +164,21 @@ def test_snippets_of_the_solver_s_documents_run():
     assert made["verdict"].certified and made["verdict"].answer["third [m/s]"] == pytest.approx(2 / 3)
     assert made["loop"].state.place[1] == pytest.approx((2.29, 0.5), abs=1e-6)
     assert made["state"].place[1] == pytest.approx((2.29, 0.5), abs=1e-6)
+    slowing = 0.5 * 9.81 / 240  # in a step: it still moves in 97 of them
+    stop = (97 * 2.0 - slowing * 97 * 98 / 2) / 240
+    assert made["world"].pose[1] == pytest.approx((stop, 0.5, 0.0), abs=1e-6)
+
+
+def test_names_in_the_table_of_symbols():
+    """Columns of the planar textbook's tables, and fields of classes that the loop and its certificate have."""
+    text = (ROOT / "docs" / "solver" / "model.md").read_text(encoding="utf-8")
+    named = {name for row in re.findall(r"^\| .*\| (.*) \| .* \|$", text, re.M) for name in re.findall(r"`(.+?)`", row)}
+    tables = {name for name in named if name.isupper()}
+    assert len(tables) == 18 and all(hasattr(columns, name) for name in tables)
+    classes = {each.__name__: each for each in (Piece, Rows, Answer, Bodies, Problem, Certificate)}
+    fields = [name.split(".") for name in named if "." in name]
+    assert {of for of, _ in fields} == set(classes)
+    assert all(field in classes[of].__annotations__ for of, field in fields)
 
 
 def listings_of_the_loop():
