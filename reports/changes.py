@@ -102,7 +102,7 @@ def _load_lines(path: Path) -> Side:
     try:
         lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise MissingError(f"run: cannot read {path}: {error}") from None
+        raise MissingError(f"run: cannot read {path}: {getattr(error, 'strerror', None) or error}") from None
     rows = [line for line in lines if isinstance(line, dict) and {"slot", "metric", "value"} <= set(line)]
     times = [line for line in lines if isinstance(line, dict) and {"slot", "purpose", "ratio"} <= set(line)]
     if len(rows) + len(times) != len(lines):

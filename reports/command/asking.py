@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from reports.command.files import wrong
 from reports.command.group import AS_JSON, main
 from reports.symptoms import OUTSIDE
 from reports.symptoms.answers import COMMAND, NOTHING, PAGE, SCENE, SEVERAL, answer, near
@@ -32,7 +33,7 @@ def ask_command(words: tuple[str, ...], as_json: bool) -> None:
     told = answer(text)
     if not any(told[key] for key in ("missed", "scene", "candidates", "command", "page")):
         reason = f"{text!r} tells no symptom; see crosscheck list scenes, and crosscheck field for known reports"
-        raise click.BadParameter(reason, param_hint="WORDS")
+        raise wrong(f"words: {reason}")
     if as_json:
         click.echo(json.dumps(told, indent=1))
         return

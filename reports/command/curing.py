@@ -66,6 +66,8 @@ def cure(
     if keep and (param or dt or any(map(is_file, names))):
         raise SceneError("keep: stores fixes of whole scenes of the catalogue, not of one case")
     params, step = fixed(param), parse_dt(dt) if dt else None
+    for name in names:
+        resolve(name).complete(params or {})  # raises before anything runs
     console, progress = terminal(), terminal(stderr=True)
     listed = {key: old for key, old in cures_of(engine).items() if old.version == version}
     found, shown = list[Cure](), called(names)

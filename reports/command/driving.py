@@ -14,6 +14,7 @@ from rich.text import Text
 from adapters import registry
 from reports.command import statuses
 from reports.command.completion import scene_names
+from reports.command.files import wrong
 from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS, Cases, gathered, missing
 from reports.terminal import print_roles, print_table, terminal
@@ -49,13 +50,13 @@ def frontier(cases: Cases, coarse: bool, jobs: int, commands: bool, as_json: boo
     known = dict.fromkeys(name for name, _ in axes())
     for name in names:
         if name not in known:
-            raise click.BadParameter(
-                f"{name} has no breaking point to search; {', '.join(known)} have", param_hint="SCENES"
-            )
+            raise wrong(f"scenes: {name} has no breaking point to search; {', '.join(known)} have")
     engines = list(cases.engine) or registry.usual()
     for name in engines:
         registry.find(name)
     found = brackets(names, engines, profiles_called(cases.profile, engines), cases.dim, coarse)
+    if not found:
+        raise wrong("scenes: no breaking point fits this selection of engines, profiles and dimensions")
     console, progress = terminal(), terminal(stderr=True)
     said = None
     for still, _ in search(found, QUICK_RATIO if coarse else FULL_RATIO, jobs):

@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from reports.command import statuses
+from reports.command.files import wrong
 from reports.command.group import AS_JSON, main
 from reports.command.selection import WORKERS
 from reports.symptoms.answers import near
@@ -31,9 +32,9 @@ def field(words: tuple[str, ...], jobs: int, commands: bool, as_json: bool) -> N
     by default. Exits with 1 if a report is no longer true.
     """
     chosen = matching(words)
-    if not chosen or not all(words):
+    if not chosen:
         hint = "".join(f"; did you mean {name!r}?" for name in near(words).values())
-        raise click.BadParameter(f"no known report has {' or '.join(map(repr, words))}{hint}", param_hint="WORDS")
+        raise wrong(f"words: no known report has {' or '.join(map(repr, words))}{hint}")
     found = ask(chosen, jobs)
     if as_json:
         click.echo(json.dumps([_as_plain(each) for each in found], indent=1))

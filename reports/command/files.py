@@ -16,24 +16,36 @@ class _File(click.ParamType):  # type: ignore[type-arg]  # click before 8.5 take
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         if str(value).endswith(("/", os.sep)):
-            field = param.name if param else "file"
-            raise _wrong(f"{field}: {value} is a folder, not a file")
-        return Path(value)
+            raise wrong(f"{called(param) or self.name}: {value} is a folder, not a file")
+        return _possible(Path(value), called(param) or self.name)
 
 
 class _Folder(click.ParamType):  # type: ignore[type-arg]  # click before 8.5 takes none
-    """Name of a folder. An empty one, as of an unset variable, is refused: it would be the current folder."""
+    """Name of a folder."""
 
     name = "folder"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        if not str(value):
-            field = param.opts[0].strip("-") if param else "folder"
-            raise _wrong(f"{field}: is empty; `.` is the folder that you are in")
-        return Path(value)
+        return _possible(Path(value), called(param) or self.name)
 
 
 FILE, FOLDER = _File(), _Folder()
+
+
+def called(param: click.Parameter | None) -> str:
+    """Name of an option without its dashes, or of an argument as the help has it: messages begin with it."""
+    if isinstance(param, click.Option):
+        return max(param.opts, key=len).strip("-")
+    return param.human_readable_name.rstrip(".") if param else ""
+
+
+def _possible(path: Path, field: str) -> Path:
+    """Return ``path`` if the system can have a file of that name, be it none yet."""
+    try:
+        path.exists()
+    except OSError as error:  # its name is too long
+        raise wrong(f"{field}: {path.name[:40]}...: {error.strerror}") from None
+    return path
 
 
 def writable(path: Path, field: str) -> Path:
@@ -45,12 +57,12 @@ def writable(path: Path, field: str) -> Path:
         With the name ``field``, if it is a folder, if its folder is missing, or if it is not writable.
     """
     if path.is_dir():
-        raise _wrong(f"{field}: {path} is a folder, not a file")
+        raise wrong(f"{field}: {path} is a folder, not a file")
     folder = nearest(path.parent)
     if field != "output" and folder != path.parent:
-        raise _wrong(f"{field}: there is no folder {path.parent}")
+        raise wrong(f"{field}: there is no folder {path.parent}")
     if not os.access(path if path.exists() else folder, os.W_OK):
-        raise _wrong(f"{field}: {path} may not be written")
+        raise wrong(f"{field}: {path} may not be written")
     return path
 
 
@@ -63,12 +75,12 @@ def folder(path: Path, field: str = "out") -> Path:
         With the name ``field``, if there is a file of that name, or no folder can be made.
     """
     if path.exists() and not path.is_dir():
-        raise _wrong(f"{field}: {path} is a file, not a folder")
+        raise wrong(f"{field}: {path} is a file, not a folder")
     there = nearest(path)
     if there == path and not os.access(path, os.W_OK):
-        raise _wrong(f"{field}: {path} may not be written; name a folder that may")
+        raise wrong(f"{field}: {path} may not be written; name a folder that may")
     if not there.is_dir() or not os.access(there, os.W_OK):
-        raise _wrong(f"{field}: {path} cannot be made, {there} is not a folder that may be written")
+        raise wrong(f"{field}: {path} cannot be made, {there} is not a folder that may be written")
     return path
 
 
@@ -77,7 +89,7 @@ def nearest(path: Path) -> Path:
     return next((p for p in (path, *path.absolute().parents) if p.exists()), path)
 
 
-def _wrong(text: str) -> Exception:
+def wrong(text: str) -> Exception:
     """The error of a wrong call; its module is imported where there is one, since all commands import this one."""
     from adapters.scene import SceneError
 

@@ -7,6 +7,7 @@ import io
 import os
 import sys
 import warnings
+from collections.abc import Iterator
 from functools import partial
 from importlib import import_module
 from typing import Any, NoReturn
@@ -14,7 +15,7 @@ from typing import Any, NoReturn
 import click
 
 from reports.command import statuses
-from reports.command.files import FOLDER
+from reports.command.files import FOLDER, called, wrong
 
 OUT = click.option(
     "--out", default="crosscheck-out", show_default=True, type=FOLDER, metavar="PATH", help="Folder for results."
@@ -73,11 +74,29 @@ SECTIONS = {
 _MODULES = {name: module for section in SECTIONS.values() for name, (module, _) in section.items()}
 
 
+class _Command(click.Command):
+    """Refuses empty words, as of a variable that is not set: they would mean a default, or the present folder."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        given, _, _ = self.make_parser(ctx).parse_args(args=list(args))
+        for param in self.params:
+            value = given.get(str(param.name))
+            if "" in (value if isinstance(value, list | tuple) else (value,)):
+                raise click.BadParameter("is empty", ctx, param)
+        return super().parse_args(ctx, args)
+
+
 class _Group(click.Group):
     """Imports the module of a command when the command is called, and prints errors as one line.
 
     The exit status says what kind of error it was (`reports.command.statuses`).
     """
+
+    command_class = _Command
+
+    def make_context(self, *args: Any, **kwargs: Any) -> click.Context:
+        with _in_one_line():
+            return super().make_context(*args, **kwargs)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of all commands in the order of work."""
@@ -124,9 +143,23 @@ class _Group(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            return super().invoke(ctx)
+            with _in_one_line():
+                return super().invoke(ctx)
         except KeyboardInterrupt:
             ctx.exit(statuses.INTERRUPTED)
+
+
+@contextlib.contextmanager
+def _in_one_line() -> Iterator[None]:
+    """Make errors of click those of a wrong call, which begin with the name of the option or argument."""
+    try:
+        yield
+    except click.UsageError as error:
+        if error.ctx is not None and error.message == error.ctx.get_help():  # a call without a command
+            raise
+        name = called(error.param) if isinstance(error, click.BadParameter) else ""
+        said = "is missing" if isinstance(error, click.MissingParameter) else error.message.rstrip(".")
+        raise wrong(f"{name}: {said}" if name else error.format_message()) from None
 
 
 def _status_of(error: Exception) -> int | None:

@@ -17,6 +17,7 @@ from adapters.engine_folder import NUMBERS, folder_of
 from adapters.scene import SceneError
 from reports import listing, tables
 from reports.command.completion import engine_names, names_of_either
+from reports.command.files import FOLDER, folder
 from reports.command.group import AS_JSON, OUT, main
 from reports.terminal import terminal
 from reports.wording import profiles_called
@@ -53,6 +54,7 @@ def list_(
         from validation.questions import detection
 
         named, engine = engine is not None, engine or registry.solver()
+        registry.load(engine)
         profile = profiles_called([profile], [engine])[0] if profile else registry.profile_of(engine, "solution")
         if profile is None:
             raise EngineError(f"profile: {engine} has no exact profile; name one with --profile")
@@ -92,11 +94,13 @@ def describe(name: str, measure: bool, keep: bool, as_json: bool) -> None:
     For a scene: figure, law, parameters, checks with the reasons of their tolerances. For an engine: profiles, settings
     with reasons, quirks, and what it does when nothing is set: as it is documented, and as it is measured on request.
     """
+    if measure and name not in registry.names():
+        raise EngineError(f"measure: {name} is no engine")
     if keep:
-        folder = folder_of(name)
-        if folder is None:
-            raise EngineError(f"describe: {name} is no engine with a folder of its own to keep {NUMBERS} in")
-        kept_numbers.write(list(kept_numbers.measure_all(name)), folder / NUMBERS)
+        own = folder_of(name)
+        if own is None:
+            raise EngineError(f"keep: {name} is no engine with a folder of its own for {NUMBERS}")
+        kept_numbers.write(list(kept_numbers.measure_all(name)), own / NUMBERS)
     data = listing.describe(name, measure)
     if as_json:
         click.echo(json.dumps(data, indent=1, default=str))
@@ -169,7 +173,7 @@ def _self_test(as_json: bool) -> NoReturn:
 
 @main.command("new-adapter", epilog="Example: crosscheck new-adapter myengine")
 @click.argument("name")
-@click.option("--into", type=click.Path(file_okay=False, path_type=Path), default=Path("."), help="Folder to write to.")
+@click.option("--into", type=FOLDER, default=Path("."), help="Folder to write to.")
 @click.option("--pipe", is_flag=True, help="The engine is a program, in any language, that speaks JSON lines.")
 @AS_JSON
 def new_adapter(name: str, into: Path, pipe: bool, as_json: bool) -> None:
@@ -180,7 +184,7 @@ def new_adapter(name: str, into: Path, pipe: bool, as_json: bool) -> None:
     """
     from adapters.new_adapter import write_package
 
-    written = [str(path) for path in write_package(name, into, pipe)]
+    written = [str(path) for path in write_package(name, folder(into, "into"), pipe)]
     if as_json:
         click.echo(json.dumps({"name": name, "files": written}, indent=1))
         return

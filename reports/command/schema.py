@@ -8,13 +8,12 @@ from pathlib import Path
 import click
 
 from adapters.whole import write
+from reports.command.files import FILE, writable
 from reports.command.group import main
 
 
 @main.command(epilog="Example: crosscheck schema")
-@click.option(
-    "-o", "--output", type=click.Path(dir_okay=False, path_type=Path), help="File to write instead of the terminal."
-)
+@click.option("-o", "--output", type=FILE, help="File to write instead of the terminal.")
 def schema(output: Path | None) -> None:
     """Print the JSON Schema of scene files.
 
@@ -26,4 +25,4 @@ def schema(output: Path | None) -> None:
     if output is None:
         click.echo(text, nl=False)
     else:
-        write(output, text)
+        write(writable(output, "output"), text)

@@ -25,6 +25,9 @@ from validation.questions.sweeping import Kind, Study, grid, listed, points, ran
 from validation.records.store import Store
 from validation.workers import TIMEOUT
 
+#: Points of --random and --sobol where --samples does not say.
+SAMPLES = 256
+
 
 @dataclass(frozen=True)
 class Sweeping:
@@ -34,7 +37,7 @@ class Sweeping:
     lists: tuple[str, ...] = option((), "These values.", "--list", metavar="N=A,B,C")
     random: tuple[str, ...] = option((), "Values at random, --samples of them.", metavar="N=LOW:HIGH[:log]")
     sobol: tuple[str, ...] = option((), "Values of a Sobol sequence, --samples of them.", metavar="N=LOW:HIGH[:log]")
-    samples: int = option(256, "Number of points of --random and --sobol.", show_default=True, type=int)
+    samples: int | None = option(None, "Number of points of --random and --sobol.", show_default=str(SAMPLES), type=int)
     seed: int = option(0, "Seed of --random and --sobol.", show_default=True, type=click.IntRange(0))
     jobs: int = option(0, "Worker processes; 0: one per core.", type=JOBS)
     timeout: float = option(TIMEOUT, "Time limit per case [s].", type=SECONDS, show_default=True)
@@ -115,5 +118,7 @@ def _study(how: Sweeping) -> Study:
     for name in names:
         if names.count(name) > 1 or name in crossed:
             raise SceneError(f"sweep: {name} is varied twice")
+    if how.samples is not None and not ranges:
+        raise SceneError("samples: belongs to --random and --sobol")
     with extra("sweep"):
-        return Study(crossed, points(ranges, how.samples, how.seed))
+        return Study(crossed, points(ranges, SAMPLES if how.samples is None else how.samples, how.seed))

@@ -88,6 +88,8 @@ def tune(
     profile = profiles_called([profile], [engine])[0] if profile else profile_of(engine, "tuned")
     if profile is None:
         raise EngineError(f"profile: {engine} has no tuned one; name one with --profile")
+    if profile not in load(engine).profiles:
+        raise EngineError(f"profile: {engine} has no profile {profile!r}, only {', '.join(load(engine).profiles)}")
     known = load(engine).facts.dimensions
     dimensions = dim or ((2,) if known == {2} else (2, 3))
     found = []

@@ -143,13 +143,14 @@ def refused(call, *given):
 def test_output_to_a_file_or_a_full_folder():
     parameter = click.Option(["--junit", "junit_path"])
     assert files.FILE.convert("a/b.xml", None, None) == Path("a/b.xml")
-    assert refused(files.FILE.convert, "a/", parameter, None) == "junit_path: a/ is a folder, not a file"
+    assert refused(files.FILE.convert, "a/", parameter, None) == "junit: a/ is a folder, not a file"
     assert refused(files.FILE.convert, "a/", None, None) == "file: a/ is a folder, not a file"
     assert files.FOLDER.convert("a/", None, None) == Path("a")
-    assert refused(files.FOLDER.convert, "", click.Option(["--out"]), None) == (
-        "out: is empty; `.` is the folder that you are in"
+    long = 300 * "x"
+    assert refused(files.FOLDER.convert, long, click.Option(["-o", "--output"]), None) == (
+        f"output: {long[:40]}...: File name too long"
     )
-    assert refused(files.FOLDER.convert, "", None, None).startswith("folder: is empty")
+    assert refused(files.FILE.convert, long, None, None).startswith("file: xxx")
     assert (files.FILE.name, files.FOLDER.name) == ("file", "folder")
 
 

@@ -61,7 +61,62 @@ def test_more_workers_than_cores_refused(command):
              "releases": ["chipmunk", "7.3.1"], "sweep": ["impact", "--grid", "e=0:1:3"]}  # fmt: skip
     result = call(command, *asked.get(command, []), "--jobs", selection.MOST_JOBS + 1)
     assert result.exit_code == statuses.WRONG_CALL
-    assert "--jobs" in result.stderr and "4097" in result.stderr
+    assert one_line(result).startswith("crosscheck: jobs: 4097 is not in the range")
+
+
+LONG = 300 * "x"
+SWEEP = ["sweep", "impact", "--engine", "chipmunk"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["explain", "chipmunk/default/impact", "--run", ""], "run: is empty"),
+        (["explain", ""], "CHECK: is empty"),
+        (["show", ""], "RUN: is empty"),
+        (["findings", "--prove", ""], "prove: is empty"),
+        (["accept", "--engine", "chipmunk", "--family", ""], "family: is empty"),
+        (["run", "impact", "--cluster", ""], "cluster: is empty"),
+        (["run", "impact", "--junit", f"{LONG}.xml"], f"junit: {LONG[:40]}...: File name too long"),
+        (["run", "impact", "--out", LONG], f"out: {LONG[:40]}...: File name too long"),
+        (["run", "impact", "--iterations", "0"], "iterations: 0 is not in the range 1<=x<=1000000"),
+        (["run", "impact", "--absent"], "No such option '--absent'"),
+        ([*SWEEP, "--samples", "-1"], "samples: belongs to --random and --sobol"),
+        ([*SWEEP, "--random", "e=0:1", "--samples", "-1"], "samples: -1 must be a whole number in [1, 131072]"),
+        ([*SWEEP, "--samples", "many"], "samples: 'many' is not a valid integer"),
+        ([*SWEEP, "--csv", f"{LONG}.csv"], f"csv: {LONG[:40]}...: File name too long"),
+        (["report", "-o", LONG], f"output: {LONG[:40]}...: File name too long"),
+        (["merge", LONG], f"FOLDER: {LONG[:40]}...: File name too long"),
+        (["merge"], "FOLDER: is missing"),
+        (["export", "impact", "--to", "python", "--engine", "chipmunk", "--profile", ""], "profile: is empty"),
+        (["schema", "-o", LONG], f"output: {LONG[:40]}...: File name too long"),
+        (["schema", "-o", ""], "output: is empty"),
+        (["new-adapter", "mine", "--into", ""], "into: is empty"),
+        (["new-adapter", "mine", "--into", LONG], f"into: {LONG[:40]}...: File name too long"),
+        (["describe", "impact", "--measure"], "measure: impact is no engine"),
+        (["list", "absent"], "'absent' is not one of"),
+        (["list", "checks", "--sensitivity", "--engine", "absent"], "engine: there is no engine called 'absent'"),
+        (["frontier", "thin_wall", "--engine", "chipmunk", "--profile", "absent"], "scenes: no breaking point fits"),
+        (["cure", "chipmunk", "impact", "--param", "e=9"], "impact.e: 9 must lie in [0, 1]"),
+        (["tune", "bullet", "--profile", "absent"], "profile: bullet has no profile 'absent', only"),
+        (["releases", "--environments", "--remove", ""], "remove: is empty"),
+        (["ports", "mujoco", "--release", ""], "release: is empty"),
+        (["prune", "--older-than", "soon"], "older-than: 'soon' is not a number of days"),
+        (["absent"], "No such command 'absent'"),
+        (["--absent"], "No such option '--absent'"),
+    ],
+)
+def test_wrong_word_in_one_line_that_names_it(words, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = call(*words)
+    assert result.exit_code == statuses.WRONG_CALL and not result.stdout
+    assert len(result.stderr.splitlines()) == 1 and said in one_line(result)
+    assert not list(tmp_path.iterdir())
+
+
+def test_call_without_a_command_as_the_list_of_commands():
+    result = call()
+    assert result.exit_code in (0, statuses.WRONG_CALL) and "Start here:" in result.output
 
 
 @pytest.mark.parametrize("command", ["run", "bench", "compile", "residuals"])
@@ -84,14 +139,14 @@ def test_comparison_without_a_name(tmp_path):
     """It was the folder that one was in."""
     result = call("compare", "", str(tmp_path))
     assert result.exit_code == statuses.WRONG_CALL
-    assert one_line(result).startswith("crosscheck: run: a side is empty")
+    assert one_line(result) == "crosscheck: A: is empty"
 
 
-@pytest.mark.parametrize(("arguments", "field"), [(["merge", ""], "sources"), (["export", "--parquet", ""], "parquet")])
+@pytest.mark.parametrize(("arguments", "field"), [(["merge", ""], "FOLDER"), (["export", "--parquet", ""], "parquet")])
 def test_folder_without_a_name_refused_for_merge_and_output(tmp_path, arguments, field):
     result = call(*arguments, "--out", tmp_path / "out")
     assert result.exit_code == statuses.WRONG_CALL
-    assert one_line(result) == f"crosscheck: {field}: is empty; `.` is the folder that you are in"
+    assert one_line(result) == f"crosscheck: {field}: is empty"
     assert not (tmp_path / "out").exists()
 
 
