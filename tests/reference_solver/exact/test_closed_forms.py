@@ -340,3 +340,92 @@ def test_slide_with_a_closing_speed_of_round_off():
     end = record(model, 0.5).pose[-1, 1]
     assert np.abs(end - (2.0 * 0.5 - 0.5 * 0.28 * G * 0.25, 0.25, 0.0)).max() < 1e-9
     assert certify(model, Settings.reference(DT), 120).holds
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("mu", [0.1, 0.5])
+def test_ball_that_rolls_against_a_wall(d, mu):
+    """The wall's friction lifts it: by k/(1 + k) v, which stops the slip v of its front, or by mu (1 + e) v."""
+    speed, e, k, radius = 2.0, 0.6, 0.5 if d == 2 else 0.4, 0.5
+    aside = (0.0,) * (d - 2)
+    wall = Body(HalfSpace((-1.0, *aside, 0.0)), motion="fixed", pose=(1.0, *(0.0,) * (d - 1), *UPRIGHT[d]))
+    spin = (-speed / radius,) if d == 2 else (0.0, speed / radius, 0.0)
+    bodies = [ground(d), wall, ball(d, up(d, radius), (speed, *(0.0,) * (d - 1)), radius=radius, spin=spin)]
+    friction = np.full((3, 3), mu)
+    found = record(Model(d, bodies, up(d, -G), e, friction), 0.3)
+    rise, back = min(k / (1.0 + k), mu * (1.0 + e)) * speed, e * speed
+    t = np.maximum(found.t - 0.5 / speed, 0.0)
+    assert t[-1] < 2.0 * rise / G
+    truth = np.minimum(speed * found.t, 0.5) - back * t, radius + rise * t - 0.5 * G * t * t * (t > 0.0)
+    assert np.abs(found.pose[:, 2, [0, d - 1]].T - truth).max() < SMALL
+    left = found.twist[-1, 2, 2 if d == 2 else 4] * (1.0 if d == 2 else -1.0)
+    assert abs(left - (rise / (k * radius) - speed / radius)) < SMALL
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_plate_on_supports_of_different_restitution(d):
+    """It falls flat; over each support it leaves with e of its speed, and the middle with the mean of both."""
+    low, high, apart, speed, radius = 0.3, 0.8, 0.6, 2.0, 0.2
+    aside = (0.0,) * (d - 2)
+    supports = [replace(ball(d, (side * apart, *aside, -radius), radius=radius), motion="fixed") for side in (-1, 1)]
+    plate = box(d, (1.0, *(0.5,) * (d - 2), 0.1), up(d, 0.3), up(d, -speed))
+    e = np.array([[0.0, 0.0, low], [0.0, 0.0, high], [low, high, 0.0]])
+    found = record(Model(d, [*supports, plate], (0.0,) * d, e, 0.0), 0.2, 48)
+    after = found.t[-1] - 0.2 / speed
+    rise, turn = 0.5 * (low + high) * speed, 0.5 * (high - low) * speed / apart
+    axis, sign = (2, 1.0) if d == 2 else (4, -1.0)
+    assert abs(found.pose[-1, 2, d - 1] - 0.1 - rise * after) < SMALL
+    assert abs(sign * found.twist[-1, 2, axis] - turn) < SMALL
+
+
+def test_capsule_that_spins_on_its_side():
+    """Both ends carry half of its weight and rub against it: w = w_0 - mu m g a t / I, until it stops."""
+    half, radius, mu, spin, moment = 0.4, 0.1, 0.3, 5.0, 0.06
+    rod = Body(Capsule(half, radius), 1.0, (0.01, moment, moment), (0.0, 0.0, radius, *UPRIGHT[3]), (*(0.0,) * 5, spin))
+    found = record(Model(3, [ground(3), rod], up(3, -G), 0.0, mu), 0.5)
+    rate = mu * G * half / moment
+    t = np.minimum(found.t, spin / rate)
+    angle = spin * t - 0.5 * rate * t * t
+    assert spin / rate < found.t[-1]
+    assert np.abs(found.pose[:, 1, :3] - up(3, radius)).max() < SMALL
+    quaternion = np.stack([np.cos(0.5 * angle), 0.0 * t, 0.0 * t, np.sin(0.5 * angle)], axis=1)
+    assert np.abs(found.pose[:, 1, 3:] - quaternion).max() < SMALL
+
+
+@pytest.mark.parametrize("share", [1.0 - 1e-8, 1.0 + 1e-8, 1.5])
+def test_disc_that_a_torque_drives(share):
+    """Of I = k m r^2, it rolls up to a torque of (1 + k) mu m g r and slips beyond."""
+    k, mu, radius = 0.5, 0.4, 0.5
+    torque = share * (1.0 + k) * mu * G * radius
+    driven = replace(ball(2, up(2, radius), radius=radius), torque=torque)
+    found = record(Model(2, [ground(2), driven], up(2, -G), 0.0, mu), 2.0)
+    pull = min(share, 1.0) * mu * G  # friction over the mass
+    turns = (torque - pull * radius) / (k * radius**2)
+    t = found.t[:, None]
+    truth = 0.5 * t * t * (-pull, 0.0, turns) + (0.0, radius, 0.0)
+    assert np.abs(found.pose[:, 1] - truth).max() < SMALL
+
+
+def test_board_on_rollers_that_turn_outwards():
+    """Friction draws it away from the middle: x'' = mu g x / (d + mu b), with rollers at +-d and the half height b."""
+    aside, half, mu, radius, start = 0.8, 0.1, 0.4, 0.3, 0.01
+    rollers = [
+        Body(Disc(radius), motion="prescribed", pose=(side * aside, -radius, 0.0), twist=(0.0, 0.0, -20.0 * side))
+        for side in (-1.0, 1.0)
+    ]
+    found = record(Model(2, [*rollers, box(2, (3.0, half), (start, half))], up(2, -G), 0.0, mu), 1.0)
+    truth = start * np.cosh(math.sqrt(mu * G / (aside + mu * half)) * found.t)
+    assert np.abs(found.pose[:, 2, 0] - truth).max() < SMALL
+    assert np.abs(found.pose[:, 2, 1] - half).max() < SMALL
+
+
+@pytest.mark.parametrize("share", [1.0 - 1e-8, 1.0 + 1e-8])
+def test_block_on_a_slope_at_the_limit_of_friction(share):
+    """It starts at 1e-8 less friction than holds it, and stays at 1e-8 more."""
+    lean, time = 0.2, 20.0
+    mu = share * math.tan(lean)
+    pull = G * math.sin(lean), -G * math.cos(lean)
+    found = record(Model(2, [ground(2), box(2, (0.5, 0.2), up(2, 0.2))], pull, 0.0, mu), time, 240)
+    truth = 0.5 * max(pull[0] + mu * pull[1], 0.0) * found.t**2
+    assert truth[-1] == 0.0 if share > 1.0 else truth[-1] > 1e-6
+    assert np.abs(found.pose[:, 1, 0] - truth).max() < 1e-12
