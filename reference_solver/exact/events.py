@@ -12,9 +12,9 @@ import numpy as np
 from scipy.optimize import brentq, fminbound
 
 from reference_solver.exact.bodies import World
-from reference_solver.exact.features import features_of, margins, width_of_margins
+from reference_solver.exact.features import margins, width_of_margins
 from reference_solver.exact.forces import LEAST, NONE
-from reference_solver.exact.kernels.features import FACE, POINT
+from reference_solver.exact.kernels.features import FACE
 from reference_solver.exact.meeting import next_meeting
 from reference_solver.exact.motion import Piece, free_acceleration
 from reference_solver.exact.problem import OPEN, SLIP, STICK
@@ -35,8 +35,8 @@ MOST_ROUNDS = 1000
 class Kind(Enum):
     """What happens at the end of a piece."""
 
-    LOOK = "nothing: it is as long as it may be"
-    SEARCH = "nothing: the search for a meeting stopped and goes on"
+    LOOK = "a step ends that may be no longer for its tolerance"
+    SEARCH = "bodies are so near that the search for their meeting stops and goes on"
     FEATURE = "a contact comes to the end of a feature"
     SLIDE = "a slide ends"
     LIFT = "a load ends"
@@ -78,9 +78,7 @@ class Monitors:
     """What must not fall below zero while a piece lasts.
 
     For each of m contacts: ``width`` margins of its features [m], how fast it slips in its direction at the start of
-    the piece [m/s], its load and the friction that it could still bear [N]; infinite where there is none. Of a corner
-    on a face in space also the heights of its body's other corners over the face [m]: where one falls below it beyond
-    its end, an edge has come down on the end.
+    the piece [m/s], its load and the friction that it could still bear [N]; infinite where there is none.
 
     Parameters
     ----------
@@ -96,18 +94,9 @@ class Monitors:
         # A slip that may turn ends where hardly anything is left of it; one that begins may have less.
         begun = np.linalg.norm(self._contacts.at_state(piece.start).rows.speed[:, 1:], axis=1)
         self._ended = np.minimum(world.slipping, 0.5 * begun)
-        count, points = len(modes), world.bodies.point.shape[1]
-        a, b, kind_a, number_a, kind_b, number_b = self._contacts.features.T
-        lies = world.edged[a, b] & (np.sort([kind_a, kind_b], axis=0) == [[POINT], [FACE]]).all(axis=0)
-        self._corners = np.flatnonzero(lies)
-        up = kind_a == FACE
-        self._face = np.where(up, (a, number_a), (b, number_b))[:, lies]
-        self._corner = np.where(up, (b, number_b), (a, number_a))[:, lies]
-        self._watched = np.arange(points) < world.bodies.points[self._corner[0], None]
-        self.noise = np.full((count, self.width + 3 + points * bool(lies.any())), MARGIN * world.size)
-        self._watched &= self._heights(piece.start.place, piece.start.axes) > MARGIN * world.size
+        self.noise = np.full((len(modes), self.width + 3), MARGIN * world.size)
         self.noise[:, self.width] = world.still
-        self.noise[:, self.width + 1 : self.width + 3] = NONE * (
+        self.noise[:, self.width + 1 :] = NONE * (
             LEAST * world.load + np.abs(self._answer.forces[:, :1]).max(initial=0.0)
         )
 
@@ -130,19 +119,7 @@ class Monitors:
         else:
             slip = (slip * answer.directions).sum(axis=1)
         ends = margins(self._world, place, axes, self._contacts.features)
-        found = np.column_stack([ends, np.where(self._slips, slip, np.inf), load, grip])
-        if not len(self._corners):
-            return found
-        heights = np.full((len(found), self._watched.shape[1]), np.inf)
-        heights[self._corners] = np.where(self._watched, self._heights(place, axes), np.inf)
-        return np.concatenate([found, heights], axis=1)
-
-    def _heights(self, place: Array, axes: Array) -> Array:
-        """Return how high points (c, p) are above the faces that a corner of their body lies on [m]."""
-        point, normal = features_of(self._world, place, axes)
-        body, corner = self._corner
-        apart = point[body] - point[body, corner][:, None]
-        return np.asarray(np.einsum("cpd,cd->cp", apart, normal[tuple(self._face)]))
+        return np.column_stack([ends, np.where(self._slips, slip, np.inf), load, grip])
 
     def shares(self) -> list[float]:
         """Return the shares at which to look."""
@@ -159,8 +136,6 @@ class Monitors:
 
     def kind(self, column: int) -> Kind:
         """Return what happens where a column of the monitors falls below zero."""
-        if column > self.width + 2:
-            return Kind.MEET
         return {self.width: Kind.SLIDE, self.width + 1: Kind.LIFT, self.width + 2: Kind.SLIP}.get(column, Kind.FEATURE)
 
 

@@ -13,7 +13,9 @@ pairs in space that may meet with their edges: of all half-spaces the one is tak
 meeting it is the plane between the edges, whose direction matters in second order only, so that steps converge fast.
 
 A contact holds its own point; all other points of its bodies are followed like any. One that touches and is not held
-leaves: with a speed, or without one, and then it must first rise over the noise.
+leaves: with a speed, or without one, and then it must first rise over the noise. Of a body in space with a corner on a
+face all points are above the whole plane of that face: where one comes down on it beyond the face, an edge has come
+down on the end of the face.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ import numpy as np
 
 from reference_solver.exact.bodies import World
 from reference_solver.exact.features import no_gap
-from reference_solver.exact.kernels.features import POINT
+from reference_solver.exact.kernels.features import FACE, LINE, POINT
 from reference_solver.exact.kernels.meeting import first_meeting, first_meeting_of_pairs
 from reference_solver.exact.motion import Piece
 from reference_solver.exact.rows import Contacts
@@ -64,21 +66,25 @@ def next_meeting(world: World, piece: Piece, contacts: Contacts, after_instant: 
     Where the search takes too many steps, return the share up to which nothing meets, and True.
     """
     bodies, n = world.bodies, len(world.bodies.free)
-    held = np.zeros((n, n, bodies.point.shape[1]), np.bool_)
-    touch = np.zeros((n, n), np.bool_)
+    held = np.zeros((2, n, n, bodies.point.shape[1]), np.bool_)
+    touch, planes = np.zeros((n, n), np.bool_), set()
     for a, b, kind_a, i, kind_b, j in contacts.features.tolist():
         touch[a, b] = touch[b, a] = True
-        if kind_b == POINT:
-            held[a, b, j] = True
-        if kind_a == POINT:
-            held[b, a, i] = True
+        for o, kind, k, w, on, e in ((a, kind_a, i, b, kind_b, j), (b, kind_b, j, a, kind_a, i)):
+            if on == POINT:
+                held[:, o, w, e] = True
+                if kind == FACE and world.edged[o, w]:
+                    planes.add((o, w, k))
+            elif on == LINE:
+                held[1, o, w, bodies.line[w, e]] = True
+    over = np.array(sorted(planes), np.int64).reshape(-1, 3)
     course = course_of(piece)
     edges = world.edged & ~touch
     none = no_gap(world, piece.start.place)
     if after_instant:
         none = np.maximum(none, NOISE * world.size)
     scales = np.array([NOISE * world.size, SLOW * world.speed * piece.length])
-    found = first_meeting(bodies, course, held, (~edges).astype(np.int64), scales, none)
+    found = first_meeting(bodies, course, held, (~edges).astype(np.int64), over, scales, none)
     if edges.any():
         crossed = first_meeting_of_pairs(bodies, course, edges.astype(np.int64), scales, none)
         found = min(found, crossed, key=itemgetter(0))

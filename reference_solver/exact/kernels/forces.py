@@ -15,7 +15,8 @@ def solve_near(matrix, wanted, start, scale):
     """Return x with ``matrix @ x = wanted`` whose change from ``start``, over ``scale``, is the least.
 
     Rows are made orthogonal, the one that those before say least of first (Gram and Schmidt); what they say all of is
-    left out. Each round leaves of the last one's remainder what round-off does.
+    left out: where a trial of a step is off, redundant rows contradict each other by the square of that. Each round
+    leaves of the last one's remainder what round-off does.
     """
     m, n = matrix.shape
     rows, size, left, ones = matrix * scale, np.empty(m), np.ones(m), np.ones(n)
@@ -81,14 +82,13 @@ def solve_groups(features, held, rows, free, groups, forces, acceleration):
         for a in range(begin[g], begin[g + 1]):
             count += 1 if modes[order[a]] == SLIP else d
         matrix, wanted, names = np.empty((count, count)), np.zeros(count), np.empty((count, 2), np.int64)
-        i, size = 0, 0.0
+        i = 0
         for a in range(begin[g], begin[g + 1]):
             c = order[a]
             for r in range(d):
                 does = rows.rate[c, r]
                 for x in range(2):
                     does += dot(rows.row[c, r, x], free[features[c, x]])
-                size = max(size, abs(does))
                 if r == 0 or modes[c] != SLIP:
                     names[i, 0], names[i, 1], wanted[i] = c, r, -does
                     i += 1
@@ -105,8 +105,6 @@ def solve_groups(features, held, rows, free, groups, forces, acceleration):
         for i in range(count):
             start[i], scale[i] = near[names[i, 0], names[i, 1]], weight[names[i, 0], names[i, 1]]
         found = solve_near(matrix, wanted, start, scale)
-        if np.abs(np.dot(matrix, found) - wanted).max() > 1e-9 * size:
-            found = start
         for i in range(count):
             forces[names[i, 0], names[i, 1]] = found[i]
     acceleration[:] = free

@@ -5,9 +5,9 @@ import numpy as np
 from reference_solver.exact.kernels.compiled import inner_kernel, kernel
 from reference_solver.exact.kernels.rotation import cross, dot, turn_axes
 
-#: Which point of a pair: none, and no body's turn is left out. Numbers of numpy's: a kernel is compiled anew for a
-#: constant of Python's.
-PAIR, TURNS = np.int64(-1), np.int64(0)
+#: Which point of a pair: none; no body's turn is left out; all faces of the owner count. Numbers of numpy's: a kernel
+#: is compiled anew for a constant of Python's.
+PAIR, TURNS, ALL = np.int64(-1), np.int64(0), np.int64(-1)
 #: A share that no piece has.
 NEVER = 2.0
 #: Steps after which a search stops: the piece is cut there, and the search goes on from its end.
@@ -129,6 +129,7 @@ def holds_all(bodies, course, who, s, normal):
 def clear(bodies, course, who, s, seen, bounds):
     """Return the gap of a point from body ``who[0]`` grown by both radii, and how far it stays clear.
 
+    Of all the body, or only of the half-space of its face ``who[4]`` if that is not `ALL`.
     ``bounds``: a lift that is added to the gap, the least rate of gaps that count, T, how far to look, and the gap
     below which a half-space counts only if it holds all of the point's body as well: else the point runs along it, as
     a corner of a box does along the side of another that stands on the same floor.
@@ -140,6 +141,8 @@ def clear(bodies, course, who, s, seen, bounds):
     gap, far = -1e300, 0.0
     n = np.zeros(d)
     for f in range(bodies.faces[o] + 1):
+        if who[4] != ALL and f != who[4]:
+            continue
         if f < bodies.faces[o]:
             h = -bodies.offset[o, f] - r
             for p in range(d):
@@ -307,7 +310,7 @@ def clear_of_pair(bodies, course, who, s, bounds, rates, room):
             continue
         r = bodies.radius[o] + bodies.radius[w]
         for k in range(bodies.points[w]):
-            write_seen(course, bodies.generator, (o, w, TURNS, PAIR), bodies.point[w, k], s, seen[k])
+            write_seen(course, bodies.generator, (o, w, TURNS, PAIR, ALL), bodies.point[w, k], s, seen[k])
         count = write_directions(bodies, o, w, seen, directions)
         for m in range(count):
             n, n1, n2 = directions[m, 0], directions[m, 1], directions[m, 2]
@@ -404,16 +407,47 @@ def meeting(bodies, course, who, limits, rates, room):
     return s, 1
 
 
+@inner_kernel
+def meeting_of_points(bodies, course, who, held, bounds, limits, room):
+    """Return what `meeting` does, of all points of body ``who[1]`` that are not held (p,) with body ``who[0]``.
+
+    ``who``: both bodies, whether the owner's turn is left out, and which face of it counts (`clear`). ``bounds``: see
+    `write_bounds`.
+    """
+    o, w, fixed, face = who
+    until, noise, slow, none, least = limits
+    first, stopped = until, 0
+    rates = np.zeros((2, 3))
+    apart = np.sqrt(dot(course.place[o] - course.place[w], course.place[o] - course.place[w]))
+    own = bounds[o, 1].copy()
+    if fixed == 1:
+        bounds[o, 1] = 0.0
+    for k in range(bodies.points[w]):
+        if held[k]:
+            continue
+        arm = np.sqrt(dot(bodies.point[w, k], bodies.point[w, k]))
+        write_rates(bounds, o, w, arm, apart, rates[0])
+        if rates[0, 0] > 0.0:
+            s, ended = meeting(bodies, course, (o, w, fixed, k, face), (first, noise, slow, none, least), rates, room)
+            if s < first:
+                first, stopped = s, ended
+    bounds[o, 1] = own
+    return first, stopped
+
+
 @kernel
-def first_meeting(bodies, course, held, pairs, scales, none):
+def first_meeting(bodies, course, held, pairs, planes, scales, none):
     """Return the first share of a piece at which points that are not held meet another body, or `NEVER`; see `meeting`.
 
     Parameters
     ----------
     held
-        (n, n, p): by owner, other body and point, whether a contact holds the point.
+        (2, n, n, p): by owner, other body and point, whether a contact holds the point; and the same with both ends of
+        lines that contacts hold.
     pairs
         (n, n): whether the pair is followed here.
+    planes
+        (c, 3): owner, other body, and a face of the owner whose whole plane that body stays above.
     scales
         Noise of gaps [m], speed of what leaves, as a way in the piece [m].
     none
@@ -421,7 +455,6 @@ def first_meeting(bodies, course, held, pairs, scales, none):
     """
     n, d = course.place.shape
     bounds = np.zeros((n, 2, 3))
-    rates = np.zeros((2, 3))
     write_bounds(course, bounds)
     room = np.zeros((1, 3, d)), np.zeros((1, 3, d))
     first, stopped = NEVER, 0
@@ -432,32 +465,23 @@ def first_meeting(bodies, course, held, pairs, scales, none):
             if bodies.points[o] == 1 and (bodies.points[w] > 1 or o > w):
                 continue  # what is round meets corners where they meet it
             fixed = 1 if bodies.points[o] == 1 else 0
-            apart = 0.0
-            for p in range(d):
-                apart += (course.place[o, p] - course.place[w, p]) ** 2
-            apart = np.sqrt(apart)
+            apart = np.sqrt(dot(course.place[o] - course.place[w], course.place[o] - course.place[w]))
             r = bodies.radius[o] + bodies.radius[w]
             way = min(first, 1.0) * (bounds[o, 0, 0] + bounds[w, 0, 0])
             if bodies.points[o] > 0 and apart - bodies.reach[o] - bodies.reach[w] - r > way:
                 continue
             size = apart + bodies.reach[w] + r + (bodies.reach[o] if bodies.points[o] > 0 else 0.0)
-            for k in range(bodies.points[w]):
-                if held[o, w, k]:
-                    continue
-                arm = 0.0
-                for p in range(d):
-                    arm += bodies.point[w, k, p] ** 2
-                own = bounds[o, 1].copy()
-                if fixed == 1:
-                    bounds[o, 1] = 0.0
-                write_rates(bounds, o, w, np.sqrt(arm), apart, rates[0])
-                bounds[o, 1] = own
-                if rates[0, 0] == 0.0:
-                    continue
-                limits = (min(first, 1.0), max(scales[0], none[o, w]), scales[1], none[o, w], 1e-16 * size)
-                s, ended = meeting(bodies, course, (o, w, fixed, k), limits, rates, room)
-                if s < first:
-                    first, stopped = s, ended
+            limits = (min(first, 1.0), max(scales[0], none[o, w]), scales[1], none[o, w], 1e-16 * size)
+            s, ended = meeting_of_points(bodies, course, (o, w, fixed, ALL), held[0, o, w], bounds, limits, room)
+            if s < limits[0]:
+                first, stopped = s, ended
+    for c in range(len(planes)):
+        o, w, face = planes[c]
+        size = bodies.reach[o] + bodies.reach[w]
+        limits = (min(first, 1.0), max(scales[0], none[o, w]), scales[1], none[o, w], 1e-16 * size)
+        s, ended = meeting_of_points(bodies, course, (o, w, TURNS, face), held[1, o, w], bounds, limits, room)
+        if s < limits[0]:
+            first, stopped = s, ended
     return first, stopped
 
 
@@ -486,7 +510,7 @@ def first_meeting_of_pairs(bodies, course, pairs, scales, none):
             write_rates(bounds, o, w, reach_w, apart, rates[0])
             write_rates(bounds, w, o, reach_o, apart, rates[1])
             limits = (min(first, 1.0), max(scales[0], none[o, w]), scales[1], none[o, w], 1e-15 * (apart + r))
-            s, ended = meeting(bodies, course, (o, w, TURNS, PAIR), limits, rates, room)
+            s, ended = meeting(bodies, course, (o, w, TURNS, PAIR, ALL), limits, rates, room)
             if s < first:
                 first, stopped = s, ended
     return first, stopped
