@@ -289,7 +289,7 @@ def _laws(run: Run) -> Iterator[float]:
         swing = turns_beside(run, _angle(first, last)).clip(max=2.0)
     else:
         swing = np.where((first * last).sum(axis=1) < 0.0, 2.0, 0.0)
-    turned = swing + np.where(sure[:, 0], 0.0, _unsure_turn(run, slip))
+    turned = swing + np.where(sure[:, 0], 0.0, unsure_turn(run, slip))
     missed = np.linalg.norm(along - wanted, axis=1) - np.where(frozen, 0.0, limit * turned) - leaning
     yield _worst(np.where(coarse, 0.0, missed), scale)
 
@@ -334,7 +334,7 @@ def speeds(run: Run) -> Array:
     return np.asarray(0.5 * total)
 
 
-def _unsure_turn(run: Run, slip: Array) -> Array:
+def unsure_turn(run: Run, slip: Array) -> Array:
     """Sine (c,) by which a slip may be turned that was taken at the point of the start, at most 2.
 
     In the piece that point goes elsewhere on bodies that spin.

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_solver.certificate.audit.contact import reduced_mass
+from reference_solver.certificate.audit.contact import reduced_mass, unsure_turn
 from reference_solver.certificate.audit.motion import swings, turned_by_momentum
 from reference_solver.certificate.audit.run import Run, cross, twist_of
 from reference_solver.certificate.audit.turning import rotation_vector, turned_contacts
@@ -56,20 +56,23 @@ def _shut(run: Run) -> Array:
 def _friction(run: Run) -> Array:
     """Energy (p,) that friction takes at most in each piece: its impulses times the larger slip of both ends [J].
 
-    Between them a slip may be faster: by an eighth of what accelerations add, times the share by which they change.
+    Between them a slip may be faster: by an eighth of what accelerations add, times the share by which they change. So
+    may that of the end where its point is not known, as of a rod that lies flush and rolls.
     """
     pieces, over = run.pieces, turned_contacts(run)
     (row_a, row_b), (a, b) = run.side, (pieces.body_a, pieces.body_b)
     slips = []
     for late, point, normal in ((False, pieces.point, pieces.normal), (True, over.last_point, over.last_normal)):
         moving = run.velocity_at(row_b, b, point, late, late) - run.velocity_at(row_a, a, point, late, late)
-        slips.append(np.linalg.norm(moving - (moving * normal).sum(axis=1)[:, None] * normal, axis=1))
+        slips.append(moving - (moving * normal).sum(axis=1)[:, None] * normal)
+    slip = np.maximum(*(np.linalg.norm(each, axis=1) for each in slips))
+    slip *= 1.0 + np.where(np.isfinite(over.stray), 0.0, unsure_turn(run, slips[0]))
     along = pieces.impulse - (pieces.impulse * over.normal).sum(axis=1)[:, None] * over.normal
     # A mean normal is known but for its lean, a mean slip but for that of its direction.
     size = np.linalg.norm(along, axis=1) + over.lean * np.linalg.norm(pieces.impulse, axis=1)
     added = np.linalg.norm(pieces.impulse, axis=1) / reduced_mass(run) + run.pull * pieces.length[run.contact_owner]
     taken = np.zeros(len(pieces))
-    np.add.at(taken, run.contact_owner, size * (np.maximum(*slips) + 0.25 * swings(run)[run.contact_owner] * added))
+    np.add.at(taken, run.contact_owner, size * (slip + 0.25 * swings(run)[run.contact_owner] * added))
     return taken
 
 
