@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -63,7 +64,7 @@ class Loop:
         Error of a step of `Turning`.
     longest
         Longest piece [s]. Motion is the same with any.
-    pieces, steps, events
+    pieces, steps
         How many there were; steps are the pieces that were made to the tolerance.
     ends
         Why the piece that was returned last ends.
@@ -78,8 +79,8 @@ class Loop:
         Of the next step to the tolerance [s]; None where a closed form is tried first.
     after_instant
         Whether the piece before was an instant, see `PROGRESS`.
-    row_began
-        When the last `MOST_IN_A_ROW` events began [s].
+    row, row_began
+        The last events, up to `MOST_IN_A_ROW`, by what happened, and when they began [s].
     """
 
     world: World
@@ -88,13 +89,13 @@ class Loop:
     longest: float
     pieces: int = 0
     steps: int = 0
-    events: int = 0
     ends: Kind = Kind.LOOK
     held: Held | None = None
     left_out: frozenset[tuple[int, ...]] = frozenset()
     blows: list[Blow] = field(default_factory=list)
     next_length: float | None = None
     after_instant: bool = False
+    row: Counter[str] = field(default_factory=Counter)
     row_began: float = 0.0
 
     def next_piece(self) -> tuple[list[Blow], Piece]:
@@ -111,6 +112,8 @@ class Loop:
                 continue
             piece = self._move(held)
             event = first_event(self.world, piece, self.after_instant)
+            if held.lasts is not None and event.kind is Kind.MEET:  # rebounds up to there are followed
+                continue
             if event.at_start:
                 self.held = self._with_modes_ended(held, event)
                 continue
@@ -266,8 +269,10 @@ class Loop:
 
     def _count(self, what: str) -> None:
         """Count an event, and refuse where time hardly goes on."""
-        self.events += 1
-        if self.events % MOST_IN_A_ROW == 0:
+        self.row[what] += 1
+        if self.row.total() == MOST_IN_A_ROW:
             if self.state.t - self.row_began < ROW * self.longest:
-                raise NoProgress(count=MOST_IN_A_ROW, t=self.state.t, last=what)
+                most = max(self.row, key=lambda each: (self.row[each], each != Kind.LOOK.value))
+                raise NoProgress(count=MOST_IN_A_ROW, t=self.state.t, most=most)
             self.row_began = self.state.t
+            self.row.clear()

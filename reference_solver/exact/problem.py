@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from reference_solver.exact.cones import add_friction, loads_with_friction, within_cones
 from reference_solver.exact.kernels.forces import OPEN, SLIP, STICK, solve_near
-from reference_solver.exact.refusals import Undecided, Unlawful
+from reference_solver.exact.refusals import NoSolution, Undecided, Unlawful
 from reference_solver.exact.rows import Contacts
 from reference_solver.model import Array
 from reference_solver.pieces import Indices
@@ -94,7 +94,8 @@ class Problem:
         Raises
         ------
         NoSolution, Unconverged
-            If no forces exist, or none are found (`cones`).
+            If no forces exist, or none are found (`cones`): those of a method without an end grow until what they do
+            together is round-off of what each does.
         Undecided, Unlawful
             If the modes that were found have no forces, or those break a law by more than `BROKEN`.
         """
@@ -107,6 +108,8 @@ class Problem:
         answer = self._polished(found.reshape(-1, self.dimension), t)
         broken = self.broken(answer)
         if broken > BROKEN:
+            if ROUND_OFF * self._alone(found) > BROKEN * self.size:
+                raise NoSolution
             raise Unlawful(t=t, share=broken)
         return answer
 
@@ -190,8 +193,11 @@ class Problem:
 
     def _told_by(self, forces: Array) -> float:
         """What velocities are measured by: of light bodies between heavy ones, by all that forces do one by one."""
-        alone = np.abs(self.rows) @ (np.abs(self.yields) @ np.abs(forces.ravel()))
-        return max(self.size, 10.0 * ROUND_OFF / NONE * float(alone.max()))
+        return max(self.size, 10.0 * ROUND_OFF / NONE * self._alone(forces))
+
+    def _alone(self, forces: Array) -> float:
+        """Return the largest of what forces (m, d) or (m d,) do to contacts, their sizes added up."""
+        return float((np.abs(self.rows) @ (np.abs(self.yields) @ np.abs(forces.ravel()))).max())
 
     def broken(self, answer: Answer) -> float:
         """Return the largest share of their size by which velocities or forces of an answer break a law."""

@@ -63,7 +63,7 @@ class NoStep(Refused):
 class NoProgress(Refused):
     """Events follow each other in no time, or in hardly any."""
 
-    sentence = "{count} events follow each other at {t:.9g} s and time hardly goes on; the last: {last}"
+    sentence = "{count} events follow each other at {t:.9g} s and time hardly goes on; most often {most}"
 
 
 class TooManyImpacts(Refused):
