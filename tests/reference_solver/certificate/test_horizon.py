@@ -55,6 +55,20 @@ def test_horizon_by_a_known_growth(angle, monkeypatch):
     assert certify(model, Settings.reference(DT), steps, 5).horizon > late + 0.5
 
 
+@pytest.mark.parametrize(("steps", "stride"), [(960, 5), (960, 960), (1, 1)])
+def test_horizon_of_motions_that_part_and_meet(steps, stride):
+    """A ball slides from the top of a disc into a corner and lies there, from wherever it left the disc."""
+    corner = [Body(HalfSpace((s * math.sqrt(0.5), math.sqrt(0.5))), motion="fixed") for s in (-1.0, 1.0)]
+    top = Body(Disc(RADIUS), pose=(-0.5, 2.0, 0.0), motion="fixed")
+    ball = Body(Disc(BALL), 1.0, 0.005, (-0.5 + 1e-6, 2.0 + RADIUS + BALL, 0.0))
+    model = Model(2, [*corner, top, ball], (0.0, -10.0), 0.0, 0.0)
+    found = certify(model, Settings.reference(4.0 / steps), steps, stride)
+    assert found.holds
+    assert np.hypot(*found.pose[-1, 3, :2]) == pytest.approx(math.sqrt(2.0) * BALL, abs=1e-9)
+    assert found.horizon <= found.t[-1]
+    assert found.error_until(found.t[-1]) == np.inf
+
+
 def test_the_bench_knows_the_same_growth():
     assert truth.GROWTH == GROWTH == 1e3
 
