@@ -49,6 +49,22 @@ def test_digits_gained_by_a_smaller_tolerance():
     assert near < 1e-2 * far
 
 
+def test_error_of_a_ball_that_spins_fast():
+    """On a turntable Ω a ball with the moment k m r² circles at k Ω/(1 + k); its steps end by how far it has turned."""
+    k, turning, speed, at, steps = 0.36, 56.0, 20.0, 2.0, 60
+    still = (1.0, 0.0, 0.0, 0.0)
+    table = Body(
+        HalfSpace((0.0, 0.0, 1.0)), pose=(0.0,) * 3 + still, motion="prescribed", twist=(0.0,) * 5 + (turning,)
+    )
+    ball = Body(Sphere(1.0), 1.0, (k,) * 3, (at, 0.0, 1.0, *still), (speed, 0.0, 0.0, turning * at, speed, 0.0))
+    model = Model(3, [table, ball], (0.0, 0.0, -1000.0), 0.0, 20.0)
+    found = certify(model, Settings.reference(0.03, 1e-4), steps)
+    assert found.holds, found.reasons
+    rate = k * turning / (1.0 + k)
+    way = speed / rate * np.stack([np.sin(rate * found.t), 1.0 - np.cos(rate * found.t)], axis=1)
+    assert (np.linalg.norm(found.pose[:, 1, :2] - (at, 0.0) - way, axis=1) <= found.error).all()
+
+
 def test_a_tolerance_below_round_off():
     with pytest.raises(ValueError, match="tolerance"):
         Settings.reference(0.01, 1e-13)
