@@ -35,7 +35,7 @@ from reference_solver.certificate.audit import (
     Answers,
     Finding,
     answers,
-    audit,
+    audited,
     ends_of_series,
     first_without_order,
     grazes,
@@ -216,7 +216,8 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1, other
     gap = GAP * max((reach(body.shape) for body in model.bodies if body.motion == "free"), default=1.0)
     gap += COORDINATE_UNITS * float(np.spacing(place))
     grazed = grazes(model, record, settings.dt, gap, np.minimum(growth, GROWTH))
-    findings = [*audit(model, record, settings.dt), shared]
+    measured, unexplained = audited(model, record, settings.dt)
+    findings = [*measured, shared]
     reasons = [str(finding) for finding in findings if not finding.holds]
     round_off = np.maximum.accumulate(moved * SOLVE / DISTURBANCE)
     error = _error(model, run, record, steps, stride, others) + round_off
@@ -233,7 +234,9 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1, other
     # A difference of two motions that obey the laws grows as that disturbance does, and what all runs are off by.
     slips = slips_taken_out(model, record, settings.dt)
     joint = joint_blows(model, record, settings.dt, no_gap(world_of(model), place))
-    error = np.maximum.accumulate(error + np.clip(growth, 1.0, GROWTH) * (apart + slips + joint) + grazed)
+    error = np.maximum.accumulate(
+        error + np.clip(growth, 1.0, GROWTH) * (apart + slips + joint + 2.0 * unexplained) + grazed
+    )
     until = _determined(model, record.t, apart, shared.limit)
     until = min(until, float(record.t[record.t < two].max()) if two < np.inf else np.inf)
     rest = (unique, two < np.inf, moved / size, settings.dt, gap, grazed, record.pose)

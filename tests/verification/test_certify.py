@@ -99,11 +99,11 @@ def test_self_test_detections_by_corruption_and_size(monkeypatch):
     (first,), (second,) = ([row for row in cells if row and row[0] == name] for name in ("law", "motion"))
     assert first == ["law", "friction", "block", "MISSED", *["coulomb"] * (len(SIZES) - 1), "no check asks for it"]
     assert second == ["motion", "a place", "ball", *["gap"] * len(SIZES), ""]
-    assert f"2 of 2 noticed at size {JUDGED:g}, 95% required" in result.stderr and "missed:" not in result.stderr
+    assert f"2 of 2 noticed at size {JUDGED:g}, 100% required" in result.stderr and "missed:" not in result.stderr
 
 
 def test_failed_self_test_below_its_share(monkeypatch):
     result = planted(monkeypatch, {("friction", JUDGED)}, [])
     assert result.exit_code == 1 and result.stdout == ""
-    assert f"1 of 2 noticed at size {JUDGED:g}, 95% required" in result.stderr
+    assert f"1 of 2 noticed at size {JUDGED:g}, 100% required" in result.stderr
     assert "missed: friction, block: no check asks for it" in result.stderr

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from reference_solver.certificate.audit.run import Run, cross, twist_of
 from reference_solver.certificate.audit.turning import SOLVED, turned_contacts, turns_beside
+from reference_solver.certificate.audit.unexplained import Unexplained
 from reference_solver.geometry import nearest
 from reference_solver.model import Array
 from reference_solver.pieces import FROZEN, ROCKING
@@ -35,13 +36,13 @@ WITHIN = 1e-8
 UNITS = 4.0
 
 
-def measured(run: Run) -> Iterator[tuple[str, float]]:
+def measured(run: Run, left: Unexplained) -> Iterator[tuple[str, float]]:
     """Yield what is measured of all contacts."""
     names = ("pull", "cone", "normal", "friction", "moment", "scale", "unknown")
     if not len(run.pieces.body_a):
         yield from ((name, 0.0) for name in names)
         return
-    yield from zip(names, _laws(run), strict=True)
+    yield from zip(names, _laws(run, left), strict=True)
 
 
 def ends_of_series(run: Run) -> NDArray[np.bool_]:
@@ -198,7 +199,7 @@ def _held_by(run: Run, j: int, stopped: float) -> tuple[float, float]:
     return pressed / float(pieces.length[after]) * stopped / blow, rubbed / pressed
 
 
-def _laws(run: Run) -> Iterator[float]:
+def _laws(run: Run, left: Unexplained) -> Iterator[float]:
     pieces = run.pieces
     row_a, row_b = run.side
     a, b, n = pieces.body_a, pieces.body_b, pieces.normal
@@ -229,10 +230,14 @@ def _laws(run: Run) -> Iterator[float]:
     pulls = -pressed - unseen - taken_out - over.lean * held_back
     # What came to rest without loads still has round-off of the speeds that it had.
     left_over = mass * (LEFT_OVER * speed + SLIP_NOISE * fastest_of(speed))
-    yield _worst(np.where(correction, np.abs(pressed) - left_over, pulls), scale)
+    pulls = np.where(correction, np.abs(pressed) - left_over, pulls)
+    left.pushed(pulls.clip(min=0.0))
+    yield _worst(pulls, scale)
     leaning = (1.0 + mu * mu) * pressed.clip(min=0.0) * over.lean
     excess = held_back - mu * pressed.clip(min=0.0) - leaning - taken_out
-    yield _worst(np.where(correction, held_back - left_over, excess), scale)
+    excess = np.where(correction, held_back - left_over, excess)
+    left.pushed(excess.clip(min=0.0))
+    yield _worst(excess, scale)
 
     # Complementarity: an impulse where, and only where, the velocity after it is the least that is allowed. What is
     # allowed after an impact is -e u-, after a chain of them none; a soft rebound may be held instead.
@@ -265,7 +270,9 @@ def _laws(run: Run) -> Iterator[float]:
     parting = ~impact & (pressed <= 0.0)
     # What came to rest without loads still comes closer or parts by round-off of the speeds that it had.
     defect -= np.where(impact, 0.0, mass * ROUNDED * fastest_of(speed))
-    yield _worst(np.where(parting | coarse, 0.0, defect.clip(min=0.0)), scale)
+    defect = np.where(parting | coarse, 0.0, defect.clip(min=0.0))
+    left.pushed(defect)
+    yield _worst(defect, scale)
 
     # Maximal dissipation: friction is what stops the slip, or all of mu p_n against it. Where rows turn, the slip is
     # the mean of those at both ends, each at its own point and normal.
@@ -291,7 +298,9 @@ def _laws(run: Run) -> Iterator[float]:
         swing = np.where((first * last).sum(axis=1) < 0.0, 2.0, 0.0)
     turned = swing + np.where(sure[:, 0], 0.0, unsure_turn(run, slip))
     missed = np.linalg.norm(along - wanted, axis=1) - np.where(frozen, 0.0, limit * turned) - leaning
-    yield _worst(np.where(coarse, 0.0, missed), scale)
+    missed = np.where(coarse, 0.0, missed)
+    left.pushed(missed.clip(min=0.0))
+    yield _worst(missed, scale)
 
     about = cross(over.point, pieces.impulse)
     force = np.linalg.norm(pieces.impulse, axis=1)

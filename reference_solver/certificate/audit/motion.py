@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from reference_solver.certificate.audit.run import Run, cross, twist_of
 from reference_solver.certificate.audit.turning import changes_of_force
+from reference_solver.certificate.audit.unexplained import Unexplained
 from reference_solver.geometry import rotation
 from reference_solver.model import Array
 from reference_solver.pieces import ROCKING
@@ -22,16 +23,16 @@ BLOCK = 2048
 UNSEEN = 6.0 / 720.0
 
 
-def measured(run: Run, pose: Array, record: Record) -> Iterator[tuple[str, float]]:
+def measured(run: Run, pose: Array, record: Record, left: Unexplained) -> Iterator[tuple[str, float]]:
     """Yield what is measured of the motion; ``pose`` (n, P) at the start, samples as the record has them."""
     end = record.pose[-1]
     yield "finite", 0.0 if _all_finite(run) else 1.0
     yield "joined", max(_joined(run, pose, end), _sampled(run, record))
     yield "time", _time(run)
-    yield "momentum", _momentum(run)
-    yield "spin", _spin(run)
-    yield from _path(run)
-    yield "turn", _turn(run)
+    yield "momentum", _momentum(run, left)
+    yield "spin", _spin(run, left)
+    yield from _path(run, left)
+    yield "turn", _turn(run, left)
     yield "prescribed", _prescribed(run, pose, end)
 
 
@@ -97,7 +98,7 @@ def _time(run: Run) -> float:
     return worst
 
 
-def _momentum(run: Run) -> float:
+def _momentum(run: Run, left: Unexplained) -> float:
     """Change of m v against impulses and loads, each body in each piece, as a share of all that acts on it."""
     pieces, mass = run.pieces, run.mass[run.pieces.body][:, None]
     before, after = (mass * twist[:, : run.d] for twist in (pieces.twist_before, pieces.twist_after))
@@ -106,10 +107,11 @@ def _momentum(run: Run) -> float:
     defect = np.linalg.norm(after - before - linear - load, axis=1)
     scale = np.linalg.norm(before, axis=1) + np.linalg.norm(after, axis=1) + size + np.linalg.norm(load, axis=1)
     still = mass[:, 0] * run.still[pieces.body]
+    left.gained(defect / mass[:, 0])
     return _worst(np.maximum(defect - still, 0.0), scale + still, run.free[pieces.body])
 
 
-def _spin(run: Run) -> float:
+def _spin(run: Run, left: Unexplained) -> float:
     """Change of angular momentum against moments and torques, as a share of all that acts.
 
     About the body's own place at the start of the piece. Where levers stood still they moved with the body, and its
@@ -141,10 +143,11 @@ def _spin(run: Run) -> float:
     scale = sum(parts) + moment_size + arm * (run.mass[body] * speed + size)
     # A body whose outermost points are so slow stands still, as in `_momentum`.
     defect = np.linalg.norm(gained, axis=1) - np.where(frozen, 0.0, unseen) - arm * run.mass[body] * still
+    left.gained(arm * np.maximum(defect, 0.0) / run.moments[body].min(axis=1))
     return _worst(np.maximum(defect, 0.0), scale, run.free[body])
 
 
-def _path(run: Run) -> Iterator[tuple[str, float]]:
+def _path(run: Run, left: Unexplained) -> Iterator[tuple[str, float]]:
     """Ways of free bodies against their velocities: those nothing touches, and those something touches.
 
     With constant acceleration the way is the mean velocity times the time. In a phase of fifth order the velocity
@@ -163,6 +166,7 @@ def _path(run: Run) -> Iterator[tuple[str, float]]:
     noise = 8.0 * np.spacing(np.abs(pieces.pose_before[:, : run.d]).max(axis=1, initial=0.0))
     defect = np.maximum(defect - bend - noise - 4.0 * np.spacing(length * np.linalg.norm(mean, axis=1)), 0.0)
     size = np.where(np.isfinite(run.extent), run.extent, 1.0)[body]
+    left.went(defect)
     share = np.where(run.free[body], defect / size, 0.0)
     yield "flight", float(share[~touched].max(initial=0.0))
     yield "path", float(share[touched].max(initial=0.0))
@@ -206,7 +210,7 @@ def turned_by(run: Run) -> Array:
     return angle
 
 
-def _turn(run: Run) -> float:
+def _turn(run: Run, left: Unexplained) -> float:
     """Orientations of free bodies against their spins, in space by Euler's equations [rad].
 
     Torques are constant where rows stand still; where they turn, spins bend as paths do. Sums of low rebounds are not
@@ -232,12 +236,16 @@ def _turn(run: Run) -> float:
         mean = 0.5 * (first + last)[:, 0]
         turn = pieces.pose_after[rows, 2] - pieces.pose_before[rows, 2]
         noise = 8.0 * np.spacing(np.abs(pieces.pose_after[rows, 2])) + bend
-        return float(np.maximum(np.abs(turn - length * mean) - noise, 0.0).max())
+        off = np.maximum(np.abs(turn - length * mean) - noise, 0.0)
+        left.went(arm * off, rows)
+        return float(off.max())
     q, _ = turned_by_momentum(run, rows)
     dot = (q * pieces.pose_after[rows, 3:]).sum(axis=1)
     off = 2.0 * np.linalg.norm(q * np.sign(dot)[:, None] - pieces.pose_after[rows, 3:], axis=1)
     whole = np.linalg.norm(pieces.pose_after[rows, 3:], axis=1)
-    return float(np.where(np.abs(dot) > 0.5 * whole, np.maximum(off - bend, 0.0), np.pi).max())
+    off = np.where(np.abs(dot) > 0.5 * whole, np.maximum(off - bend, 0.0), np.pi)
+    left.went(arm * off, rows)
+    return float(off.max())
 
 
 def _touched(run: Run) -> NDArray[np.bool_]:

@@ -9,14 +9,22 @@ import numpy as np
 
 from reference_solver.certificate.audit.motion import integrated_turn
 from reference_solver.certificate.audit.run import Indices, Run, scaled_along, twist_of
-from reference_solver.certificate.audit.turning import cubic, moved_by, way_between
+from reference_solver.certificate.audit.turning import cubic, missed_by_cubic, moved_by, way_between
 from reference_solver.geometry import distinct, gap, rotation
 from reference_solver.model import Array, HalfSpace
+from reference_solver.shapes import Disc, Sphere
 
 #: Halvings of an interval in which two bodies might have met: sixteen parts of it.
 HALVINGS = 4
-#: Turn in a piece [rad] beyond which it is cut into parts, and that of a part: .1^4/384 is less than an overlap counts.
+#: Turn in a piece [rad] beyond which it is cut into parts, and that of a part.
 FAR, PART, MOST_PARTS = 0.3, 0.1, 512
+#: How far a body may be from the cubic polynomials of a piece whose rows turn: its place, as a share of the smallest
+#: half width, and its turn [rad]. The record cuts pieces so that each number of either is off by half of that (E80).
+BESIDE = 2e-9
+#: Share of a half width by which bodies may overlap at their contacts, as in the check ``apart``.
+ACROSS = 1e-9
+#: Share of a half width by which what may be missed is not looked into: a tenth of the overlap that is allowed.
+SHALLOW = 1e-12
 
 
 class Path(NamedTuple):
@@ -28,6 +36,7 @@ class Path(NamedTuple):
     way: Array  # (k, 3 | 6) displacement and turn over each
     first: Array  # (k, 3 | 6) twist at the start of each
     last: Array  # (k, 3 | 6) and at its end
+    beside: Array  # (k,) how far the body may be from the cubic polynomial of each [m]
 
 
 def measured(run: Run, start: Array) -> Iterator[tuple[str, float]]:
@@ -39,7 +48,14 @@ def measured(run: Run, start: Array) -> Iterator[tuple[str, float]]:
 
 
 def _overlaps(run: Run, start: Array) -> tuple[float, float]:
-    """Deepest overlap of any pair at any time, and at the start, as shares of the smaller half width."""
+    """Deepest overlap of any pair at any time, and at the start, as shares of the smaller half width.
+
+    The first is what is deeper than at the start, and than paths are known; and than contacts are closed, of bodies
+    that touch.
+    """
+    pieces, n = run.pieces, len(run.free)
+    carry = (pieces.impulse != 0.0).any(axis=1)
+    touch = set((pieces.body_a * n + pieces.body_b)[carry].tolist())
     paths = [_path(run, i, start) for i in range(len(run.free))]
     low, high = np.array([_extremes(path) for path in paths]).swapaxes(0, 1)
     arm = np.where(np.isfinite(run.reach), run.reach, np.inf)[:, None]
@@ -53,7 +69,9 @@ def _overlaps(run: Run, start: Array) -> tuple[float, float]:
             begin = gap(run.model.bodies[i].shape, start[i], run.model.bodies[int(j)].shape, start[int(j)])
             deep = min(begin, _pair(run, i, int(j), paths[i], paths[int(j)]))
             # What is no number stays none, and is within no limit.
-            worst, first = float(np.maximum(worst, -deep / size)), float(np.maximum(first, -begin / size))
+            known = max(-begin, ACROSS * size if i * n + j in touch else 0.0)
+            worst = float(np.maximum(worst, (-deep - known) / size))
+            first = float(np.maximum(first, -begin / size))
     return worst, first
 
 
@@ -78,13 +96,17 @@ def _path(run: Run, i: int, start: Array) -> Path:
         begin: Array = np.arange(count, dtype=np.float64) * length
         twists = np.tile(twist, (count, 1))
         poses = np.tile(start[i], (count, 1)) if run.free[i] else run.prescribed_pose(i, begin)
-        return Path(begin, length, poses, length[:, None] * twists, twists, twists)
-    begin, length, before, after, first, last = _parts(run, rows)
-    return Path(begin, length, before, way_between(before, after), first, last)
+        return Path(begin, length, poses, length[:, None] * twists, twists, twists, np.zeros(count))
+    begin, length, before, after, first, last, frozen = _parts(run, rows)
+    reach = 0.0 if isinstance(run.model.bodies[i].shape, Disc | Sphere) else run.reach[i]
+    beside = np.where(frozen, 0.0, BESIDE * (run.size + reach))
+    if run.d == 3:
+        beside += missed_by_cubic(reach, length, first[:, 3:], last[:, 3:])
+    return Path(begin, length, before, way_between(before, after), first, last, beside)
 
 
-def _parts(run: Run, rows: Indices) -> tuple[Array, ...]:
-    """Begin, length, poses and twists at both ends of rows of one body; those that turn far are cut into parts.
+def _parts(run: Run, rows: Indices) -> tuple[Any, ...]:
+    """Begin, length, poses, twists at both ends, and whether forces are even, of rows of one body, far turns in parts.
 
     Between its ends a turn of more than a half is not to be told, and one of `FAR` known to its fourth power over 384.
     Where forces are even it is integrated.
@@ -98,7 +120,8 @@ def _parts(run: Run, rows: Indices) -> tuple[Array, ...]:
     at, cuts, first = (np.repeat(x, count) for x in (rows, count, np.cumsum(count) - count))
     part = np.arange(len(at)) - first
     (pose, twist), (later, last) = (_state(run, at, (k / cuts)[:, None]) for k in (part, part + 1))
-    return pieces.begin[run.owner[at]] + part / cuts * run.length[at], run.length[at] / cuts, pose, later, twist, last
+    begin = pieces.begin[run.owner[at]] + part / cuts * run.length[at]
+    return begin, run.length[at] / cuts, pose, later, twist, last, (run.is_frozen & ~run.is_rocking)[run.owner[at]]
 
 
 def _state(run: Run, rows: Indices, share: Array) -> tuple[Array, Array]:
@@ -129,10 +152,11 @@ def _pose_at(path: Path, k: Indices, t: Array) -> Array:
 
 
 def _pair(run: Run, i: int, j: int, one: Path, other: Path) -> float:
-    """Least gap of two bodies over the run [m]; only what could have been missed is looked into.
+    """Least gap of two bodies over the run, if both are beside their paths [m]; what may be missed is looked into.
 
     Over an interval h a gap cannot fall by more than the bound L of its rate times the time, so that it stays above
-    (g_0 + g_1 - L h)/2. Where that is above the deepest found, nothing is missed; else the interval is halved.
+    (g_0 + g_1 - L h)/2. Where that is above the deepest found, nothing is missed; else the interval is halved, and in
+    the end its gap is taken where a parabola has its least.
     """
     shapes = run.model.bodies[i].shape, run.model.bodies[j].shape
     times = np.unique(np.concatenate([one.begin, other.begin, [one.begin[-1] + one.length[-1]]]))
@@ -140,7 +164,7 @@ def _pair(run: Run, i: int, j: int, one: Path, other: Path) -> float:
 
     def gaps(t: Array, k: Indices, m: Indices) -> Array:
         pose_i, pose_j = _pose_at(one, k, t - one.begin[k]), _pose_at(other, m, t - other.begin[m])
-        return distinct(shapes[0], pose_i, shapes[1], pose_j).gap
+        return distinct(shapes[0], pose_i, shapes[1], pose_j).gap + one.beside[k] + other.beside[m]
 
     rate = _closing(run, i, j, one, other, k[:-1], m[:-1])
     near = _near(run, i, j, one, other, times, k, m, rate)
@@ -149,7 +173,7 @@ def _pair(run: Run, i: int, j: int, one: Path, other: Path) -> float:
     begin, end, k, m, rate = times[:-1][near], times[1:][near], k[:-1][near], m[:-1][near], rate[near]
     first, last = gaps(begin, k, m), gaps(end, k, m)
     least = min(float(first.min()), float(last.min()))
-    tolerance = 1e-7 * min(run.extent[i], run.extent[j])
+    tolerance = SHALLOW * min(run.extent[i], run.extent[j])
     for _ in range(HALVINGS):
         open_ = 0.5 * (first + last - rate * (end - begin)) < min(least, 0.0) - tolerance
         if not open_.any():
@@ -158,6 +182,12 @@ def _pair(run: Run, i: int, j: int, one: Path, other: Path) -> float:
         middle = 0.5 * (begin + end)
         between = gaps(middle, k, m)
         least = min(least, float(between.min()))
+        bend, slope = 2.0 * (first + last) - 4.0 * between, 4.0 * between - 3.0 * first - last
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.where(bend > 0.0, -0.5 * slope / bend, np.nan)
+        dips = (share > 0.0) & (share < 1.0)
+        if dips.any():
+            least = min(least, float(gaps((begin + share * (end - begin))[dips], k[dips], m[dips]).min()))
         begin, end = np.concatenate([begin, middle]), np.concatenate([middle, end])
         first, last = np.concatenate([first, between]), np.concatenate([between, last])
         k, m, rate = (np.concatenate([x, x]) for x in (k, m, rate))

@@ -15,33 +15,37 @@ from reference_solver.certificate.audit.choice import closes_sooner, is_cornered
 from reference_solver.certificate.audit.contact import reduced_mass
 from reference_solver.certificate.audit.run import POINT, Indices, Run, placed, turned, twist_of
 from reference_solver.certificate.audit.turning import SAME, pose_within, unseen
+from reference_solver.certificate.audit.unexplained import Unexplained
 from reference_solver.geometry import Nearest, core_of, distinct, rotation
 from reference_solver.model import Array, HalfSpace
 from reference_solver.shapes import smallest_extent
 
 #: Share of the smaller half width within which a gap is none: a unit in the last place of it a thousand times.
 NO_GAP = 1e-13
+#: Share of the smallest half width up to which a gap of an impact is none, whatever the loads.
+LATE = 1e-12
 #: Share of a step up to which a piece is an instant: slips that have all but ended are taken out in 1e-8 of one (E54).
 INSTANT = 1e-7
 #: Share of the speeds there, ten times what solves leave of them, above which what touches parts.
 PARTING = 1e-12
 
 
-def measured(run: Run) -> Iterator[tuple[str, float]]:
+def measured(run: Run, left: Unexplained) -> Iterator[tuple[str, float]]:
     """Yield what is measured of all contacts that carry something, and of all pairs at impacts."""
-    yield from zip(("apart", "direction", "place", "choice", "stays"), _touching(run), strict=True)
+    yield from zip(("apart", "direction", "place", "choice", "stays"), _touching(run, left), strict=True)
     yield "together", _left_out(run)
 
 
-def _touching(run: Run) -> list[float]:
+def _touching(run: Run, left: Unexplained) -> list[float]:
     """Worst gap, error of a normal [rad], and distance of a contact point from a surface, as shares of the extent.
 
     Then by how much faster bodies close along a normal than along another that is as good, as a share of the speeds,
     and how far contacts open within their pieces (`_opened`). Only contacts with an impulse are measured. Those of
     low rebounds that are summed up close a gap: they are left out.
     """
-    pieces = run.pieces
+    pieces, force = run.pieces, np.linalg.norm(run.pieces.impulse, axis=1)
     worst, doubt, mass = np.zeros(5), unseen(run), reduced_mass(run)
+    astray, apart = np.zeros((2, len(force)))
     coarse = run.is_rocking[run.contact_owner]
     carry = (np.abs(pieces.impulse) > 0.0).any(axis=1) & ~coarse & np.isfinite(pieces.normal).all(axis=1)
     pairs = pieces.body_a * len(run.free) + pieces.body_b
@@ -69,14 +73,25 @@ def _touching(run: Run) -> list[float]:
             sooner = float(closes_sooner(run, rows[hit], (shape_a, shape_b), at, found.gap[hit]).max())
         place = placed(pieces.point[rows], run.d)
         sides = [distinct(shape, pose, POINT, place).gap for shape, pose in ((shape_a, pose_a), (shape_b, pose_b))]
-        off_surface = max((np.abs(side) - np.abs(found.gap) - noise).max() for side in sides) / size
-        here = ((np.abs(found.gap) - noise).max() / size, max(lost.max(), length.max(), off.max()), off_surface)
+        beside = np.max([np.abs(side) - np.abs(found.gap) for side in sides], axis=0) - noise
+        apart[rows] = (np.abs(found.gap) - noise).clip(min=0.0)
+        here = ((np.abs(found.gap) - noise).max() / size, max(lost.max(), length.max(), off.max()), beside.max() / size)
+        astray[rows] = force[rows] * (off.clip(min=0.0) + beside.clip(min=0.0) / size)
         lasts = np.flatnonzero(pieces.length[run.contact_owner[rows]] > INSTANT * run.dt)
+        # What lasts is apart by its largest gap, and once.
+        apart[rows[lasts]] = np.diff(np.maximum.accumulate(apart[rows[lasts]]), prepend=0.0)
         point = 0.5 * (found.point_a + found.point_b)[lasts]
         opened = (
             _opened(run, rows[lasts], (pose_a[lasts], pose_b[lasts]), point, noise, doubt, mass) if len(lasts) else 0.0
         )
         worst = np.maximum(worst, [*here, sooner, opened])
+    left.pushed(astray)
+    left.met(2.0 * apart)  # before and after
+    # Loads change speeds for as long as an impact comes too late or too soon.
+    approach = -(run.meeting_velocity(after=False) * pieces.normal).sum(axis=1)
+    hit = run.is_impact[run.contact_owner] & (approach > 0.0)
+    late = (apart - LATE * run.size).clip(min=0.0) / np.where(hit, approach, np.inf)
+    left.pushed(2.0 * mass * np.minimum(run.pull * late, np.where(hit, approach, 0.0)))
     return [float(x) for x in worst]
 
 

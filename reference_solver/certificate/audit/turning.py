@@ -49,7 +49,7 @@ def turned_contacts(run: Run) -> Turned:
     owner = run.contact_owner
     turning = ~run.is_frozen[owner] & (np.abs(pieces.impulse) > 0.0).any(axis=1)
     pairs = pieces.body_a * len(run.free) + pieces.body_b
-    alone, off = _alone(owner, pairs), unseen(run)
+    single, off = alone(owner, pairs), unseen(run)
     if turning.any():
         change = np.where(turning, changes_of_force(run), 0.0)
     for pair in np.unique(pairs[turning]):
@@ -76,11 +76,11 @@ def turned_contacts(run: Run) -> Turned:
         normal[rows] /= np.linalg.norm(normal[rows], axis=1)[:, None]
         last_normal[rows] += later[1]
         # Of points that share a load, each may take it over from the others.
-        change[rows] = np.where(alone[rows], change[rows], UNKNOWN_CHANGE)
+        change[rows] = np.where(single[rows], change[rows], UNKNOWN_CHANGE)
         lean[rows] = np.where(told, SLACK * chord * (chord + change[rows]) + chord.clip(max=SAME), 2.0 * most) + SOLVED
         place, sure = _places(run, rows, seen)
         moved = np.linalg.norm(place[2] - place[0], axis=1)
-        sure = sure & told & alone[rows]
+        sure = sure & told & single[rows]
         point[rows] = np.where(sure[:, None], (place[0] + 4.0 * place[1] + place[2]) / 6.0, point[rows])
         last_point[rows] = np.where(sure[:, None], place[2], last_point[rows])
         far = SLACK * moved * (most + change[rows]) + 1e-12 * run.size
@@ -89,7 +89,7 @@ def turned_contacts(run: Run) -> Turned:
     return Turned(normal, last_normal, point, last_point, lean, stray, change)
 
 
-def _alone(owner: Indices, pairs: Indices) -> NDArray[np.bool_]:
+def alone(owner: Indices, pairs: Indices) -> NDArray[np.bool_]:
     """Whether (c,) a contact is the only one of its pair in its piece."""
     keys = owner * (int(pairs.max(initial=0)) + 1) + pairs
     _, which, count = np.unique(keys, return_inverse=True, return_counts=True)
@@ -113,7 +113,7 @@ def changes_of_force(run: Run) -> Array:
         np.add.at(total, first, pieces.impulse[rows])
         mean = total / pieces.length[at][:, None]
         force = np.linalg.norm(mean, axis=1)
-        follows = _follows(run, at)
+        follows = follow_on(run, at)
         step = np.linalg.norm(np.diff(mean, axis=0), axis=1) * 2.0 / (pieces.length[at][1:] + pieces.length[at][:-1])
         step = np.where(follows, step, 0.0)
         known = np.concatenate([[False], follows]) & np.concatenate([follows, [False]])
@@ -133,10 +133,10 @@ def turns_beside(run: Run, turned: Array) -> Array:
     pieces, owner = run.pieces, run.contact_owner
     length, found = pieces.length[owner], turned.copy()
     pairs = pieces.body_a * len(run.free) + pieces.body_b
-    usable = _alone(owner, pairs) & (length > 0.0)
+    usable = alone(owner, pairs) & (length > 0.0)
     for pair in np.unique(pairs[usable]):
         rows = np.flatnonzero(usable & (pairs == pair))
-        follows = _follows(run, owner[rows])
+        follows = follow_on(run, owner[rows])
         rate = np.where(turned[rows] < 1.0, turned[rows], 0.0) / length[rows]
         before = np.concatenate([[0.0], np.where(follows, rate[:-1], 0.0)])
         after = np.concatenate([np.where(follows, rate[1:], 0.0), [0.0]])
@@ -144,7 +144,7 @@ def turns_beside(run: Run, turned: Array) -> Array:
     return found
 
 
-def _follows(run: Run, at: Indices) -> NDArray[np.bool_]:
+def follow_on(run: Run, at: Indices) -> NDArray[np.bool_]:
     """Whether (s - 1,) each of some pieces (s,), in the order of time, begins where the one before it ends."""
     begin, end = run.pieces.begin[at], run.pieces.begin[at] + run.pieces.length[at]
     return np.asarray(np.abs(begin[1:] - end[:-1]) <= 1e-12 * run.dt + 4.0 * np.spacing(np.abs(end[:-1])))
@@ -209,9 +209,15 @@ def _places(run: Run, rows: Indices, seen: list[Nearest]) -> tuple[list[Array], 
 def unseen(run: Run) -> Array:
     """How far (m,) the middle of a path may be from where a cubic polynomial has it: (w h)^4/384 of a body, thrice."""
     first, last = (x[:, run.d :] for x in (run.pieces.twist_before, run.pieces.twist_after))
+    reach = np.where(np.isfinite(run.reach), run.reach, 0.0)[run.pieces.body]
+    return missed_by_cubic(reach, run.length, first, last)
+
+
+def missed_by_cubic(reach: Array | float, length: Array, first: Array, last: Array) -> Array:
+    """Return that of points a reach from the centre, for lengths (s,) with spins (s, 1 | 3) at both ends."""
     spin = np.maximum(np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1))
-    turn = (run.length * spin) ** 2 + run.length * np.linalg.norm(last - first, axis=1)
-    return np.where(np.isfinite(run.reach), run.reach, 0.0)[run.pieces.body] * turn * turn / 128.0
+    turn = (length * spin) ** 2 + length * np.linalg.norm(last - first, axis=1)
+    return np.asarray(reach * turn * turn / 128.0)
 
 
 def _fastest(run: Run, rows: Indices) -> Array:

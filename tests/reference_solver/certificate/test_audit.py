@@ -95,7 +95,7 @@ class TestWhatWasCertifiedOnce:
         assert not certificate.holds and "bodies 0 and 1 overlap" in certificate.reasons[0]
 
     def test_an_overlap_of_a_tenth_of_a_body(self):
-        assert {"start", "overlap"} <= refused(planar(floor(), disc(0.0, 0.5), disc(0.9, 0.5)), 10)
+        assert "start" in refused(planar(floor(), disc(0.0, 0.5), disc(0.9, 0.5)), 10)
 
     @pytest.mark.parametrize("far", [1e10, 1e15])
     def test_bodies_at_coordinates_that_resolve_no_place(self, far):

@@ -188,12 +188,14 @@ def test_body_met_and_left_again_within_a_step(kind, share):
 LIMITS = {
     0.0: {"finite", "joined", "unknown", "endless"},
     1e-14: {"pull"},
+    1e-11: {"overlap"},
     1e-12: {"time", "flight", "prescribed", "cone"},
     1e-10: {"momentum"},
     1e-9: {"spin", "path", "turn", "normal", "friction", "moment", "apart", "stays", "direction", "place", "choice",
            "together", "gained", "lost"},
     1e-7: {"resolution"},
-    1e-6: {"overlap", "start", "shared"},
+    1e-8: {"rates"},
+    1e-6: {"start", "shared"},
     1e6: {"scale"},
 }  # fmt: skip
 
