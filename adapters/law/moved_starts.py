@@ -6,9 +6,8 @@ from starts moved by it differ, the band is as wide as they do, or there is no p
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import lru_cache
-from types import MappingProxyType
 
 from adapters.law import Law, Measure, Prediction
 from adapters.law.single_precision import ROUNDINGS, UNIT, Held
@@ -37,13 +36,10 @@ def scale_of(scene: Scene, metric: str) -> float:
     return {"rebound_speed": speed, "velocity_change": speed, "impulse": scene.bodies[1].mass * speed}.get(metric, 1.0)
 
 
-def law_of_motions(
-    motions: Callable[[Scene, float, str], list[Trajectory]], blurred: Mapping[str, float] = MappingProxyType({})
-) -> Callable[[str, str], Law]:
+def law_of_motions(motions: Callable[[Scene, float, str], list[Trajectory]]) -> Callable[[str, str], Law]:
     """Laws by metric and profile, of motions in single precision from all starts, the unmoved one first.
 
-    They predict what the first measures, and how far the others are from it. ``blurred``: differences up to which a
-    metric is predicted, where that is not the share `EITHER` of its value.
+    They predict what the first measures, and how far the others are from it, up to the share `EITHER` of its value.
     """
 
     @lru_cache(maxsize=4)
@@ -57,8 +53,7 @@ def law_of_motions(
             if not known or len(known) < len(found):
                 return None
             spread, scale = max(abs(value - known[0]) for value in known), max(1.0, abs(known[0]))
-            most = blurred.get(metric, EITHER * scale)
-            return (known[0], 2.0 * spread + ROUNDINGS * UNIT * scale) if spread <= most else None
+            return (known[0], 2.0 * spread + ROUNDINGS * UNIT * scale) if spread <= EITHER * scale else None
 
         return law
 

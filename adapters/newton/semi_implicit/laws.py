@@ -10,8 +10,6 @@ from adapters.law.single_motions import standstills
 from adapters.newton.semi_implicit.motion import motions
 from adapters.newton.semi_implicit.profiles import PROFILES
 
-#: Difference up to which the time of rest is predicted [s]: round-off may add a last blow, or leave it out.
-LAST = 0.1
 #: Metrics by scene: balls and boxes on planes, where round-off does not decide on the motion.
 ROWS: Mapping[str, str] = {
     "impact": "rebound_ratio rebound_speed velocity_change",
@@ -51,9 +49,7 @@ DEVIATIONS: tuple[Deviation, ...] = deviations(
     "newton_semi_implicit",
     PROFILES,
     {scene: metrics.split() for scene, metrics in ROWS.items()},
-    law_of_motions(
-        lambda scene, dt, profile: motions(scene, dt, settings_of(PROFILES[profile], scene, dt)), {"rest_time": LAST}
-    ),
+    law_of_motions(lambda scene, dt, profile: motions(scene, dt, settings_of(PROFILES[profile], scene, dt))),
     "contacts are springs of 2.5 kN/m with dampers of 100 N s/m, in explicit steps, whatever the mass and e; friction "
     "is a damper of 1 kN s/m up to its cone; spins are damped; places are in single precision",
     "semi_implicit/kernels_contact.py, _eval_body_contact; motion in adapters/newton/semi_implicit/motion.py",
