@@ -2,21 +2,33 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from adapters import registry
-from adapters.law.single_precision import ROUNDINGS
-from validation.releases.ports import LOST, MOVES, SHARE, proof_of
+from reports.wording import number
+from validation.releases.ports import LOST, MOVES, ROUNDED, SHARE, proof_of
 
 Row = Mapping[str, str]
 #: Verdicts without a comparison of motions, in words.
 UNMOVED = {
     "unsupported": "unsupported",
     "lost": "lost in round-off",
-    "failed": "failed",
+    "failed": "no result",
 }
+#: A difference that nobody sees [m].
+SMALL = 1e-3
+#: What is counted of a port, in this order.
+KINDS = (
+    "same",
+    "same until round-off has grown",
+    f"differ by less than {1e3 * SMALL:g} mm",
+    "differ by more",
+    "differ with no cause found",
+    *UNMOVED.values(),
+)
 
 
 def sentence(row: Row) -> str:
@@ -26,7 +38,8 @@ def sentence(row: Row) -> str:
     until = f"{row['until']} s" + ("" if row["until"] == row["end"] else f" of {row['end']} s")
     if row["verdict"] == "same":
         proof = f"; to the end with {row['proof']}" if row["proof"] else ""
-        return f"same but for round-off (up to {row['apart']} m) until {until}{proof}"
+        grown = f", which grows {number(float(row['growth']))} times" if row["growth"] else ""
+        return f"same but for round-off{grown} (up to {row['apart']} m) until {until}{proof}"
     how = (
         f": {row['because']}"
         if row["because"]
@@ -40,25 +53,42 @@ def case_of(row: Row) -> str:
     return " ".join(text for text in (row["scene"], f"{row['dimension']}-D", row["params"], row["profile"]) if text)
 
 
+def kind_of(row: Row) -> str:
+    """Which of `KINDS` a case is."""
+    if row["verdict"] in UNMOVED:
+        return UNMOVED[row["verdict"]]
+    if row["verdict"] == "same":
+        return KINDS[0] if row["until"] == row["end"] else KINDS[1]
+    if not row["proof"]:
+        return KINDS[4]
+    return KINDS[2] if not row["because"] and float(row["apart"]) < SMALL else KINDS[3]
+
+
+def tally(rows: Sequence[Row], port: str) -> dict[str, int]:
+    """Number of cases of each of `KINDS`."""
+    count = Counter(kind_of(row) for row in rows if row["port"] == port)
+    return {kind: count[kind] for kind in KINDS}
+
+
 def counts(rows: Sequence[Row], port: str) -> str:
-    """Number of cases by verdict; of those that differ also how many are the same with no setting."""
-    own = [row for row in rows if row["port"] == port]
-    count = Counter(row["verdict"] for row in own)
-    unknown = sum(not row["proof"] for row in own if row["verdict"] == "differs")
-    words = {"same": "same", "differs": "differ" + (f" ({unknown} with no cause found)" if unknown else ""), **UNMOVED}
-    return f"{port}: {', '.join(f'{count[verdict]} {said}' for verdict, said in words.items() if count[verdict])}"
+    """The same in words; kinds without a case are left out."""
+    return f"{port}: {', '.join(f'{count} {kind}' for kind, count in tally(rows, port).items() if count)}"
 
 
-def causes(rows: Sequence[Row], ports: Sequence[str]) -> list[tuple[str, str, list[str]]]:
-    """Causes of differences, the settings that prove them, and the number of cases by port; most frequent first."""
+def causes(rows: Sequence[Row], ports: Sequence[str]) -> list[tuple[str, str, str, list[str]]]:
+    """Causes of differences, settings that prove them, largest distance, and number of cases by port; by frequency."""
     found: dict[tuple[str, str], Counter[str]] = {}
+    apart: dict[tuple[str, str], float] = {}
     for row in rows:
         if row["verdict"] == "differs" and row["proof"]:
             engine = registry.adapter(row["port"])
             switches = {proof_of(switched): cause for cause, switched in engine.switches.items()} if engine else {}
-            found.setdefault((switches.get(row["proof"], ""), row["proof"]), Counter())[row["port"]] += 1
+            which = (switches.get(row["proof"], ""), row["proof"])
+            found.setdefault(which, Counter())[row["port"]] += 1
+            apart[which] = max(apart.get(which, 0.0), math.inf if row["because"] else float(row["apart"]))
     often = sorted(found, key=lambda each: -found[each].total())
-    return [(cause, proof, [str(found[cause, proof][port] or "") for port in ports]) for cause, proof in often]
+    worst = {each: f"{number(apart[each])} m" if apart[each] < math.inf else "the port ends" for each in often}
+    return [(*each, worst[each], [str(found[each][port] or "") for port in ports]) for each in often]
 
 
 def told(rows: Sequence[Row]) -> dict[str, Any]:
@@ -71,10 +101,11 @@ def told(rows: Sequence[Row]) -> dict[str, Any]:
         "releases": " and ".join(sorted({row["release"] for row in rows})),
         "ports": ports,
         "causes": causes(rows, ports),
-        "counts": [counts(rows, port) for port in ports],
+        "counts": [(kind, [str(tally(rows, port)[kind] or "") for port in ports]) for kind in KINDS]
+        + [("not run", [str(sum(port not in cells for cells in cases.values()) or "") for port in ports])],
         "cases": [(case, [cells.get(port, "not run") for port in ports]) for case, cells in sorted(cases.items())],
         "moves": MOVES,
-        "roundings": ROUNDINGS,
+        "rounded": ROUNDED,
         "share": SHARE,
         "lost": 100.0 * LOST,
     }

@@ -114,6 +114,23 @@ def test_box_in_the_margin_of_a_plane_in_mjx():
 
 
 @pytest.mark.optional("mujoco_mjx")
+def test_contacts_that_do_not_fit_in_mjx(monkeypatch):
+    """Four boxes on a floor have sixteen contacts; of 40 that they might have it solves for 32."""
+    from adapters.mujoco import mjx
+
+    boxes = [
+        Body(f"box{k}", Box((0.2,) * 3), 1.0, (0.03,) * 3, (k, 0.0, 0.19, *UPRIGHT), (0.1, *[0.0] * 5))
+        for k in range(mjx.MANY)
+    ]
+    scene = replace(ball(0.3), bodies=(FLOOR, *boxes), duration=10.0 * DT)
+    here, there = (ran(each, scene) for each in (ORIGINAL, MujocoMjxEngine()))
+    assert np.abs(here.pose - there.pose).max() < 1e-9 and len(there.contacts.rows.a) == len(here.contacts.rows.a) > 16
+    monkeypatch.setattr(mjx, "CONTACTS", 4)
+    with pytest.raises(EngineError, match="contacts do not fit"):
+        ran(MujocoMjxEngine(), scene)
+
+
+@pytest.mark.optional("mujoco_mjx")
 def test_mappings_of_memory_that_mjx_keeps():
     """Linux allows 65530 of a process, and beyond it JAX aborts."""
     from adapters.mujoco import mjx

@@ -15,7 +15,7 @@ from validation.releases.ports import Compared
 
 #: Columns of the kept table: what says which case it is, then what was found.
 CASE = ("release", "port", "scene", "dimension", "params", "profile", "dt")
-COLUMNS = (*CASE, "verdict", "until", "end", "apart", "body", "since", "because", "proof")
+COLUMNS = (*CASE, "verdict", "until", "end", "apart", "body", "since", "growth", "because", "proof")
 
 
 def row_of(told: Compared, release: str) -> dict[str, str]:

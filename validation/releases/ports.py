@@ -1,26 +1,26 @@
 """Whether a port of an engine moves bodies as the engine does: the same scenes, steps and settings in both.
 
     engine                 ----o----o----o----
-    engine, start moved    ----o---o-----o---o    what round-off of single precision may do in this scene
+    engine, start moved    ----o---o-----o---o    what round-off of the port's precision may do in this scene
     port                   ----o----o--------x    differs: by more than that
 
-A step of the port rounds a state some `ROUNDINGS` times. The engine runs again from starts moved by as many roundings,
-in `MOVES` directions; what they change is multiplied by `SHARE`, for roundings of later steps. The moves are that large
-because growth of a smaller one cannot be scaled up: where bodies touch at a distance of exactly 0, one of 1e-12 already
-removes a contact for a step, and changes the motion by g dt^2 as one of 1e-6 does.
+A step of the port rounds a state by `ROUNDED`. The engine runs again from starts moved by as much, in `MOVES`
+directions; what they change is multiplied by `SHARE`, for roundings of later steps. Growth of another move cannot be
+scaled: where bodies touch at a distance of exactly 0, one of 1e-12 already removes a contact for a step, and changes
+the motion by g dt^2 as one of 1e-6 does.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from adapters import registry
-from adapters.engine import Array, Engine, EngineError
+from adapters.engine import Array, Engine, EngineError, Precision
 from adapters.isolation.foreign import checked_refusal
 from adapters.law.single_precision import ROUNDINGS, UNIT
 from adapters.plain import one_line
@@ -33,6 +33,9 @@ from adapters.trajectory import Trajectory
 from validation.cells import Slot, prepare, settings_of, slot_from_dict
 from validation.running.apart import Apart
 
+#: Round-off of a step, as a share of places and speeds. In doubles it is that of a force at the largest impedance, d =
+#: 0.9999, of which a difference of accelerations is divided by 1 - d: 2^-53/1e-4.
+ROUNDED: Mapping[Precision, float] = {"single": ROUNDINGS * UNIT, "double": 1e-12}
 #: Moved starts, and the share of what they change that round-off may change.
 MOVES, SHARE = 3, 4.0
 #: Two runs are no longer the same motion beyond this share of the room that bodies take, and of their largest distance
@@ -61,6 +64,8 @@ class Compared:
         Largest distance of the farthest point of a body in one run from the same point in the other, until then [m].
     body, since
         That body, and the time at which the distance first exceeds round-off [s].
+    growth
+        Factor by which a moved start has grown until then: the distance over the size of the move.
     because
         Why there is no comparison, or how the port ended.
     proof
@@ -76,6 +81,7 @@ class Compared:
     apart: float = math.nan
     body: str = ""
     since: float = math.nan
+    growth: float = math.nan
     because: str = ""
     proof: str = ""
 
@@ -102,12 +108,33 @@ def compared(slots: Sequence[Slot], ports: Sequence[str]) -> Iterator[Compared]:
     for port in ports:
         with Apart(PATIENCE) as apart:
             for slot in slots:
-                told = apart.ask(ask, slot, port)
-                yield told if isinstance(told, Compared) else Compared(slot, port, "failed", because=told)
+                yield explained(slot, port, apart.ask)
 
 
-def ask(slot: Slot, port: str) -> Compared:
-    """Compare one case; where it differs, find settings with which it does not."""
+def explained(slot: Slot, port: str, answer: Callable[..., Compared | str]) -> Compared:
+    """Compare one case; where it differs, find settings with which it does not.
+
+    ``answer(ask, ...)`` is the result of ``ask(...)``, or why there is none.
+    """
+    found, ported = answer(ask, slot, port, {}), registry.adapter(port)
+    if not isinstance(found, Compared):
+        return Compared(slot, port, "failed", because=found)
+    if found.verdict in ("failed", "unsupported") or found.whole or ported is None:
+        return found
+    for switched in ported.switches.values():
+        again = answer(ask, slot, port, switched)
+        if not isinstance(again, Compared):
+            continue
+        # A setting may also make round-off larger; so the distance must go as well, where the port did not end.
+        gone = bool(found.because) or SHARE * again.apart < found.apart
+        beyond = again.verdict == "same" and again.until > found.since and gone
+        if beyond if found.verdict == "differs" else again.whole:
+            return replace(found, proof=proof_of(switched))
+    return found
+
+
+def ask(slot: Slot, port: str, switched: Mapping[str, Any]) -> Compared:
+    """Compare one case, with ``switched`` settings in both."""
     own, ported = registry.load(slot.engine), registry.load(port)
     scene = prepare(slot).scene
     for engine in (own, ported):
@@ -117,18 +144,7 @@ def ask(slot: Slot, port: str) -> Compared:
             refused = str(error)
         if refused:
             return Compared(slot, port, "unsupported", because=refused)
-    posed, blank = posed_for(own, scene), Compared(slot, port, "failed")
-    found = _asked(blank, own, ported, posed, {})
-    if found.verdict == "failed" or found.whole:
-        return found
-    for switched in ported.switches.values():
-        again = _asked(blank, own, ported, posed, switched)
-        # A setting may also make round-off larger; so the distance must go as well, where the port did not end.
-        gone = bool(found.because) or SHARE * again.apart < found.apart
-        beyond = again.verdict == "same" and again.until > found.since and gone
-        if beyond if found.verdict == "differs" else again.whole:
-            return replace(found, proof=proof_of(switched))
-    return found
+    return _asked(Compared(slot, port, "failed"), own, ported, posed_for(own, scene), switched)
 
 
 def proof_of(switched: Mapping[str, Any]) -> str:
@@ -142,24 +158,26 @@ def _asked(blank: Compared, own: Engine, ported: Engine, posed: Scene, switched:
         known = engine.settable()  # a port may have settings of its own
         return run(engine, start, slot.dt, settings | {k: v for k, v in switched.items() if k in known})
 
-    slot = blank.slot
+    slot, by = blank.slot, ROUNDED[ported.facts.precision]
     scene = prepare(slot).scene
     try:
-        base, others = ran(own, posed), [ran(own, moved(posed, k)) for k in range(MOVES)]
-        return judged(blank, posed, base, others, ran(ported, posed))
+        base, others = ran(own, posed), [ran(own, moved(posed, k, by)) for k in range(MOVES)]
+        return judged(blank, posed, base, others, ran(ported, posed), by)
     except EngineError as error:
         return replace(blank, because=str(error))
 
 
-def judged(blank: Compared, posed: Scene, base: Trajectory, others: Sequence[Trajectory], port: Trajectory) -> Compared:
-    """Verdict from the motions of the engine, of the engine from moved starts (``others``), and of the port."""
+def judged(
+    blank: Compared, posed: Scene, base: Trajectory, others: Sequence[Trajectory], port: Trajectory, by: float
+) -> Compared:
+    """Verdict from the motions of the engine, of it from starts moved ``by`` a share (``others``), and of the port."""
     count = min(len(each.t) - (each.finish == "diverged") for each in (base, port, *others))
     places = base.pose[:count, _free(posed), :3]
     size = float(np.abs(places).max(initial=farthest(posed)))
     reaches = [reach(body.shape) for body in posed.bodies if body.motion == "free"]
     room = float(np.ptp(places, axis=(0, 1)).max() + 2.0 * np.max(reaches)) if reaches else size
     changed = np.max([_distances(posed, base, each)[:count].max(axis=1) for each in others], axis=0)
-    rounded = ROUNDINGS * UNIT * size * np.sqrt(np.arange(count) + 1.0)
+    rounded = by * size * np.sqrt(np.arange(count) + 1.0)
     allowed = rounded + SHARE * np.maximum.accumulate(changed)
     apart = _distances(posed, base, port)[:count]
     kept = allowed <= LOST * min(size, room)
@@ -173,6 +191,7 @@ def judged(blank: Compared, posed: Scene, base: Trajectory, others: Sequence[Tra
         end=float(base.t[count - 1]),
         apart=float(apart[at, body]),
         body=posed.bodies[int(body)].name,
+        growth=float(changed[:last].max() / (by * farthest(posed))),
     )
     if len(port.t) < len(base.t):
         return replace(found, verdict="differs", since=found.end, because=f"the port ends: {port.reason}")
@@ -187,9 +206,9 @@ def farthest(scene: Scene) -> float:
     return max((math.hypot(*body.pose[:3]) + reach(body.shape) for body in free), default=1.0)
 
 
-def moved(scene: Scene, number: int) -> Scene:
-    """The scene with places, turns and velocities of its free bodies moved by `ROUNDINGS`; ``number`` draws where."""
-    drawn, by = np.random.default_rng(number), ROUNDINGS * UNIT
+def moved(scene: Scene, number: int, by: float) -> Scene:
+    """The scene with places, turns and velocities of its free bodies moved ``by`` a share; ``number`` draws where."""
+    drawn = np.random.default_rng(number)
     size, bodies = farthest(scene), []
     for body in scene.bodies:
         if body.motion == "free":
