@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -77,18 +76,20 @@ def counts(rows: Sequence[Row], port: str) -> str:
 
 def causes(rows: Sequence[Row], ports: Sequence[str]) -> list[tuple[str, str, str, list[str]]]:
     """Causes of differences, settings that prove them, largest distance, and number of cases by port; by frequency."""
-    found: dict[tuple[str, str], Counter[str]] = {}
-    apart: dict[tuple[str, str], float] = {}
+    found: dict[str, list[Row]] = {}
     for row in rows:
         if row["verdict"] == "differs" and row["proof"]:
             engine = registry.adapter(row["port"])
             switches = {proof_of(switched): cause for cause, switched in engine.switches.items()} if engine else {}
-            which = (switches.get(row["proof"], ""), row["proof"])
-            found.setdefault(which, Counter())[row["port"]] += 1
-            apart[which] = max(apart.get(which, 0.0), math.inf if row["because"] else float(row["apart"]))
-    often = sorted(found, key=lambda each: -found[each].total())
-    worst = {each: f"{number(apart[each])} m" if apart[each] < math.inf else "the port ends" for each in often}
-    return [(*each, worst[each], [str(found[each][port] or "") for port in ports]) for each in often]
+            found.setdefault(switches.get(row["proof"], ""), []).append(row)
+    lines = []
+    for cause, own in sorted(found.items(), key=lambda each: -len(each[1])):
+        ends = any(row["because"] for row in own)
+        worst = "the port ends" if ends else f"{number(max(float(row['apart']) for row in own))} m"
+        count = Counter(row["port"] for row in own)
+        proofs = "; or ".join(dict.fromkeys(row["proof"] for row in own))
+        lines.append((cause, proofs, worst, [str(count[port] or "") for port in ports]))
+    return lines
 
 
 def told(rows: Sequence[Row]) -> dict[str, Any]:
@@ -100,6 +101,7 @@ def told(rows: Sequence[Row]) -> dict[str, Any]:
     return {
         "releases": " and ".join(sorted({row["release"] for row in rows})),
         "ports": ports,
+        "precisions": [known.precision if (known := registry.facts(port)) else "" for port in ports],
         "causes": causes(rows, ports),
         "counts": [(kind, [str(tally(rows, port)[kind] or "") for port in ports]) for kind in KINDS]
         + [("not run", [str(sum(port not in cells for cells in cases.values()) or "") for port in ports])],
