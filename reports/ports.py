@@ -17,7 +17,7 @@ UNMOVED = {
     "lost": "lost in round-off",
     "failed": "no result",
 }
-#: A difference that nobody sees [m].
+#: A difference that cannot be seen [m].
 SMALL = 1e-3
 #: What is counted of a port, in this order.
 KINDS = (
