@@ -188,10 +188,10 @@ CORNERS: Mapping[str, Mapping[str, Any]] = {
 }
 DEEPER: Mapping[str, Mapping[str, Any]] = {
     "its solver ends at its tolerance after another step": {"tolerance": 0.0},
+    "corners of a box in the margin of a plane may be no contacts": {"margin": 0.0},
     SMOOTH: {"smooth_condim": 1, "tolerance": 0.0},
     "its solver ends elsewhere with friction pyramids": {"cone": "elliptic"},
     "friction rows without friction, and pyramids": {"cone": "elliptic", "smooth_condim": 1, "tolerance": 0.0},
-    "corners of a box in the margin of a plane may be no contacts": {"margin": 0.0},
     "two boxes have contacts from an overlap of 1e-6 m on": {"margin": 0.0, "solimp": (0.99, 0.99, 0.001, 0.5, 1.0)},
 }
 

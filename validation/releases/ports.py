@@ -121,7 +121,10 @@ def explained(slot: Slot, port: str, answer: Callable[..., Compared | str]) -> C
         return Compared(slot, port, "failed", because=found)
     if found.verdict in ("failed", "unsupported") or found.whole or ported is None:
         return found
+    told = {each.name: each.value for each in settings_of(ported, slot, prepare(slot).scene)}
     for switched in ported.switches.values():
+        if all(name in told and told[name] == value for name, value in switched.items()):
+            continue
         again = answer(ask, slot, port, switched)
         if not isinstance(again, Compared):
             continue

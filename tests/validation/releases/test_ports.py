@@ -127,6 +127,15 @@ def test_proof_of_a_difference(monkeypatch):
     assert explained(slot("oblique"), "port", here).proof == ""
 
 
+def test_setting_that_a_case_has_already(monkeypatch):
+    """It is not run again."""
+    ported_as(monkeypatch, port := Port(impratio=2.0))
+    monkeypatch.setattr(port, "switches", {"margin": {"margin": 0.0}, "friction": {"impratio": 2.0}})
+    asked = []
+    explained(slot("oblique"), "port", lambda ask, *case: asked.append(case[-1]) or ask(*case))
+    assert asked == [{}, {"impratio": 2.0}]
+
+
 def test_cause_that_is_not_found_in_time(monkeypatch):
     """What is known of the difference is told all the same."""
     ported_as(monkeypatch, Port(impratio=2.0))
