@@ -77,17 +77,21 @@ def counts(rows: Sequence[Row], port: str) -> str:
 def causes(rows: Sequence[Row], ports: Sequence[str]) -> list[tuple[str, str, str, list[str]]]:
     """Causes of differences, settings that prove them, largest distance, and number of cases by port; by frequency."""
     found: dict[str, list[Row]] = {}
+    told: dict[str, str] = {}  # a port may have no more the setting of a kept row, and another one has
+    own: dict[str, dict[str, str]] = {}
+    for port in ports:
+        engine = registry.adapter(port)
+        own[port] = {proof_of(switched): cause for cause, switched in engine.switches.items()} if engine else {}
+        told |= own[port]
     for row in rows:
         if row["verdict"] == "differs" and row["proof"]:
-            engine = registry.adapter(row["port"])
-            switches = {proof_of(switched): cause for cause, switched in engine.switches.items()} if engine else {}
-            found.setdefault(switches.get(row["proof"], ""), []).append(row)
+            found.setdefault((told | own[row["port"]]).get(row["proof"], ""), []).append(row)
     lines = []
-    for cause, own in sorted(found.items(), key=lambda each: -len(each[1])):
-        ends = any(row["because"] for row in own)
-        worst = "the port ends" if ends else f"{number(max(float(row['apart']) for row in own))} m"
-        count = Counter(row["port"] for row in own)
-        proofs = "; or ".join(dict.fromkeys(row["proof"] for row in own))
+    for cause, cases in sorted(found.items(), key=lambda each: -len(each[1])):
+        ends = any(row["because"] for row in cases)
+        worst = "the port ends" if ends else f"{number(max(float(row['apart']) for row in cases))} m"
+        count = Counter(row["port"] for row in cases)
+        proofs = "; or ".join(dict.fromkeys(row["proof"] for row in cases))
         lines.append((cause, proofs, worst, [str(count[port] or "") for port in ports]))
     return lines
 

@@ -168,6 +168,11 @@ FACTS = port_facts(
         "mujoco/mjx/_src/collision_convex.py, plane_convex; measured with 3.17.0: incline",
     ),
     Quirk(
+        "with elliptic cones its solver may stop far from the solution when it starts at the forces of the last step",
+        "unchanged; with disabled=warmstart it finds the solution of C",
+        "measured with 3.17.0: two dominoes fly 600 m; a step is off by 6.5 m/s^2, without by 1e-11",
+    ),
+    Quirk(
         "a step solves for every contact that any two bodies might have",
         f"for {CONTACTS} per free body at most, from {MANY} bodies on; a run that needs more fails",
         "MJX documentation: max_contact_points; measured with 3.17.0: a column of six moves alike within 1e-13 m",
@@ -192,7 +197,11 @@ DEEPER: Mapping[str, Mapping[str, Any]] = {
     SMOOTH: {"smooth_condim": 1, "tolerance": 0.0},
     "its solver ends elsewhere with friction pyramids": {"cone": "elliptic"},
     "friction rows without friction, and pyramids": {"cone": "elliptic", "smooth_condim": 1, "tolerance": 0.0},
-    "two boxes have contacts from an overlap of 1e-6 m on": {"margin": 0.0, "solimp": (0.99, 0.99, 0.001, 0.5, 1.0)},
+    "its solver may stop where it starts, at the forces of the last step": {"disabled": ("warmstart",)},
+    "bodies that rest less than 1e-6 m deep may have no contacts": {
+        "margin": 0.0,
+        "solimp": (0.99, 0.99, 0.001, 0.5, 1.0),
+    },
 }
 
 
