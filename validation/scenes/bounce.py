@@ -325,7 +325,7 @@ SCENE = CanonicalScene(
     words={
         "apex": "rebounds at {value}",
         "apex=0": metrics.SILENT,
-        "force_in_flight": "reports a contact force of {value} of its weight in flight",
+        "force_in_flight": "reports a contact force of {value} times its weight in flight",
     },
     seen_as={"apex[1]": rebound},
     restitution=Restitution("apex", "e", "height", APEXES),
