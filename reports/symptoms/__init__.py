@@ -14,7 +14,6 @@ import sqlite3
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -187,15 +186,11 @@ def terms(stemmed: Sequence[str], same: Mapping[str, str], idle: Collection[str]
 
 
 def _without_names(question: str, names: Mapping[str, str]) -> tuple[list[str], list[str], list[str]]:
-    """Words of a question without engines; the engines, ours and others. A name after an article is a thing.
-
-    So is Newton's before his cradle.
-    """
+    """Words of a question without engines; the engines, ours and others. A name after an article is a thing."""
     words, engines, strangers = list[str](), list[str](), list[str]()
-    for word, onward in pairwise([*question.split(), ""]):
+    for word in question.split():
         plain = word.lower().strip(MARKS)
-        is_thing = words and words[-1].lower() in ("a", "an", "the", "my", "each", "every")
-        if plain not in names or is_thing or (plain == "newton" and onward.lower().startswith("cradle")):
+        if plain not in names or (words and words[-1].lower() in ("a", "an", "the", "my", "each", "every")):
             words.append(word)
         elif names[plain]:
             engines.append(names[plain])

@@ -160,12 +160,6 @@ def test_name_of_a_scene():
     assert answer("tilt_table")["scene"] == answer("tilt table mujoco")["scene"] == "tilt_table"
 
 
-def test_newton_of_the_cradle_is_no_engine():
-    for words in ("newton cradle bullet", "my Newton cradle moves all balls in bullet"):
-        assert search(words).engines == ["bullet"] and search(words).matches[0].name == "cradle"
-    assert search("cradle newton").engines == ["newton"]
-
-
 def test_engine_that_fails_with_a_fix():
     said, fix = asked("grip", "slips", "mujoco"), table()["fixes"]["pinch"]
     (own,) = [each for each in fix if each["engine"] == "mujoco"]
