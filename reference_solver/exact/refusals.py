@@ -25,9 +25,9 @@ class NoSolution(Refused):
 
 
 class NoImpulses(Refused):
-    """Bodies that meet cannot part: one with a prescribed motion crushes something."""
+    """Bodies that meet cannot part: friction wedges one, or one with a prescribed motion crushes it."""
 
-    sentence = "no impulses part the bodies that meet at {t:.9g} s: something is crushed by what is moved"
+    sentence = "no impulses part the bodies that meet at {t:.9g} s: one is wedged, or crushed by one that is moved"
 
 
 class Unconverged(Refused):
