@@ -478,7 +478,8 @@ def _disturbed(model: Model, size: float) -> list[Model]:
     """
     d, random, found = model.dimension, np.random.default_rng(SEED), []
     free = np.array([body.motion == "free" for body in model.bodies])
-    change = size * free[:, None] * random.choice([-1.0, 1.0], (len(free), d))
+    change = np.zeros((len(free), d))
+    change[free] = size * random.choice([-1.0, 1.0], (free.sum(), d))
     for _ in range(2):
         twists = [twist_of(body).copy() for body in model.bodies]
         for twist, more in zip(twists, change, strict=True):

@@ -41,9 +41,7 @@ def strike(world: World, state: State, contacts: Contacts) -> list[Blow]:
     if not (contacts.at_state(state).rows.speed[:, 0] < -world.still).any():
         return blows
     known, pair = np.unique(contacts.features[:, :2] @ (world.shape[0], 1), return_inverse=True)
-    # Pairs whose rebounds are over, those that a cycle strikes, and those that this instant has struck.
-    stopped, cycle, struck = np.zeros((3, len(known)), bool)
-    rubs = np.bincount(pair, contacts.friction) > 0.0
+    stopped, cycle = np.zeros((2, len(known)), bool)  # pairs whose rebounds are over, and those that a cycle strikes
     fastest: list[float] = []
     for count in range(MOST):
         speeds = contacts.at_state(state).rows.speed[:, 0].copy()
@@ -56,30 +54,23 @@ def strike(world: World, state: State, contacts: Contacts) -> list[Blow]:
         if look >= LOOK_BACK:
             cycle |= closing
         if look == 2 * LOOK_BACK - 1:
-            # Impacts that repeat, ever more slowly, sum up to one of all of them without rebound (E22). With friction
-            # no proof is known that they have no end: they are followed.
-            slows = max(fastest[-LOOK_BACK:]) < max(fastest[-2 * LOOK_BACK : -LOOK_BACK])
-            if slows and not rubs[cycle].any():
+            # Impacts that repeat, ever more slowly, sum up to one of all of them without rebound (E22).
+            if max(fastest[-LOOK_BACK:]) < max(fastest[-2 * LOOK_BACK : -LOOK_BACK]):
                 answer, stopped, scheme = cycle, stopped | cycle, CHAIN
             cycle = np.zeros(len(known), bool)
         lies = speeds < np.where(contacts.restitution == 0.0, max(world.still, SLOW * fastest[-1]), world.still)
-        rebounds = (struck & ~closing & ~stopped)[pair] & (contacts.restitution > 0.0) & (speeds > SLOW * fastest[-1])
-        if (lies & rebounds).any() and not rubs[struck].any():  # too slow to be told from what lies: such impacts end
-            answer, stopped, scheme = struck | closing, stopped | struck | closing, CHAIN
-        lies &= ~rebounds
-        struck |= closing
         takes_part = answer[pair] | lies if scheme == FROZEN else answer[pair]
         which = np.flatnonzero(takes_part & (speeds < FAST * fastest[-1]))
-        part, again = contacts.chosen(which), np.where(stopped[pair], 0.0, contacts.restitution)[which]
+        part, rebounds = contacts.chosen(which), np.where(stopped[pair], 0.0, contacts.restitution)[which]
         try:
-            blow = _struck(state, part, again)
+            blow = _struck(state, part, rebounds)
         except NoImpulses:
             # A wedge cannot rebound from both sides at once; to and fro it can, and ends at rest where that is low.
             high = fastest[-1] ** 2 > 2.0 * world.weight * height(world, state)
-            if high or not again.any():
+            if high or not rebounds.any():
                 raise
             stopped[pair[which]] = True
-            blow = _struck(state, part, 0.0 * again)
+            blow = _struck(state, part, 0.0 * rebounds)
         if np.array_equal(blow.after.velocity, state.velocity):
             return blows  # beside the slip an approach is round-off, which goes where forces are decided
         blows.append(replace(blow, scheme=scheme))
