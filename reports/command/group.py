@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 import click
 
 from reports.command import statuses
-from reports.command.files import FOLDER, called, wrong
+from reports.command.files import FOLDER, called
 
 OUT = click.option(
     "--out", default="crosscheck-out", show_default=True, type=FOLDER, metavar="PATH", help="Folder for results."
@@ -149,6 +149,17 @@ class _Group(click.Group):
             ctx.exit(statuses.INTERRUPTED)
 
 
+class _WrongCall(click.ClickException):
+    """Prints itself in one line, with no module that only runs need."""
+
+    exit_code = statuses.WRONG_CALL
+
+    def show(self, file: Any = None) -> None:
+        """Print the line."""
+        with contextlib.suppress(OSError):  # if stderr is closed too, the status is enough
+            click.echo(f"crosscheck: {' '.join(self.message.split())}", file, err=True)
+
+
 @contextlib.contextmanager
 def _in_one_line() -> Iterator[None]:
     """Make errors of click those of a wrong call, which begin with the name of the option or argument."""
@@ -159,7 +170,7 @@ def _in_one_line() -> Iterator[None]:
             raise
         name = called(error.param) if isinstance(error, click.BadParameter) else ""
         said = "is missing" if isinstance(error, click.MissingParameter) else error.message.rstrip(".")
-        raise wrong(f"{name}: {said}" if name else error.format_message()) from None
+        raise _WrongCall(f"{name}: {said}" if name else error.format_message()) from None
 
 
 def _status_of(error: Exception) -> int | None:

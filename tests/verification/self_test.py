@@ -26,7 +26,7 @@ from tests.verification.gate import Gate
 
 SIZES = (1e-9, 1e-8, 1e-7, 1e-5, 1e-3)
 #: Size at which the share of what is caught is promised, and that share.
-JUDGED, PROMISED = 1e-7, 1.0
+JUDGED, PROMISED = 1e-5, 1.0
 DT, G = 1.0 / 240.0, 9.81
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 REFERENCE = Settings.reference(DT)

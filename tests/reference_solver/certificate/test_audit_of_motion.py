@@ -194,8 +194,7 @@ LIMITS = {
     1e-9: {"spin", "path", "turn", "normal", "friction", "moment", "apart", "stays", "direction", "place", "choice",
            "together", "gained", "lost"},
     1e-7: {"resolution"},
-    1e-8: {"rates"},
-    1e-6: {"start", "shared"},
+    1e-6: {"start", "shared", "rates"},
     1e6: {"scale"},
 }  # fmt: skip
 
