@@ -77,12 +77,14 @@ class MjxSimulation(PortSimulation):
         from mujoco import mjx
 
         self._jax, self._port = jax, mjx
-        spec, free = Spec(self._scene, self._dt, self._settings), len(self._moving)
+        model, free = self._model, len(self._moving)
         self._room = CONTACTS * free if free >= MANY else 0
         if self._room:
-            spec.spec.add_numeric(name="max_contact_points", data=[self._room])
+            limited = Spec(self._scene, self._dt, self._settings)
+            limited.spec.add_numeric(name="max_contact_points", data=[self._room])
+            model = limited.compile()
         with self._numbers():
-            self._ported = mjx.put_model(model := spec.compile(), impl="jax")
+            self._ported = mjx.put_model(model, impl="jax")
             self._state = mjx.put_data(model, self._data, impl="jax")
         if self._settings["smooth_condim"] == 1 and not any(mu for _, mu in self._scene.materials()):
             # No contact has a cone; MJX's code of elliptic ones stops where there is none.

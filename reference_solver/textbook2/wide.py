@@ -1,6 +1,6 @@
 """Sweeps of many manifolds at once, one in each lane (`reference_solver.lanes`), with the bits of one after the other.
 
-Manifolds that share no free body change nothing of each other. A manifold therefore has a level, one more than the
+Manifolds that share no free body do not affect each other. A manifold therefore has a level, one more than the
 highest of those before it that share a free body with it: those of a level are solved together, level after level, and
 every one meets the velocities that it meets in the order of `sequential_impulses.sweep_rows`. Blocks of `LANES`
 manifolds are laid out once a step. Worth it where levels are wide, as in piles; a column has as many levels as boxes.

@@ -69,7 +69,8 @@ CHECKS = {
     # A solve's residual, 1e-13, over the ratio of the two scales that it and the audit use.
     "normal": Check(1e-9, "normal impulses do not obey restitution and complementarity"),
     "friction": Check(1e-9, "friction does not oppose the slip"),
-    # Steps are made to their ways, not to their forces: of 500 random scenes 1.6e-7 at most. What it is X contains.
+    # A way known to 1e-11 of a half width over a step h tells a force to 1e-11 (T/h)^2 of the loads, with the time T in
+    # which they move a body by it: that of h = T/300. X contains what is below it (`unexplained`).
     "rates": Check(1e-6, "forces between two pieces do not obey friction, or act beside their points"),
     # Exact where rows stand still; a point that moves is known to as much where they turn.
     "moment": Check(1e-9, "moments are not those of the impulses at their points"),

@@ -36,7 +36,7 @@ class Path(NamedTuple):
     way: Array  # (k, 3 | 6) displacement and turn over each
     first: Array  # (k, 3 | 6) twist at the start of each
     last: Array  # (k, 3 | 6) and at its end
-    beside: Array  # (k,) how far the body may be from the cubic polynomial of each [m]
+    beside: Array  # (k,) bound of the distance of any point from where these cubic polynomials have it [m]
 
 
 def measured(run: Run, start: Array) -> Iterator[tuple[str, float]]:

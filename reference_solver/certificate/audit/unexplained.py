@@ -26,7 +26,7 @@ class Unexplained:
         self._speed += speed
 
     def went(self, way: Array, rows: Indices | slice = slice(None)) -> None:
-        """Add ways (s,) of any point of the bodies of rows (s,), each of which is told once [m]."""
+        """Add ways (s,) by which any point of the bodies of rows (s,) is off [m]; no row is given twice."""
         self._way[rows] += way
 
     def pushed(self, impulse: Array) -> None:

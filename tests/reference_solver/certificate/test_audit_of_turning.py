@@ -94,6 +94,24 @@ class TestChangesOfForce:
         assert changes_of_force(run) == pytest.approx([UNKNOWN_CHANGE] * 3)
 
 
+#: Sizes up to which a corruption of the self-test is not seen, where that is so; all larger ones are, and all others.
+NOT_SEEN = {
+    "friction of a slide over a hill": 1e-6,
+    "friction where there is none, over a hill": 1e-6,
+    "moment and spin over a hill": 1e-6,
+    "inertia in space": 1e-7,
+}
+
+
+def test_corruptions_of_a_ten_millionth():
+    """What a check lets pass is no more than what it has to: ten times as much is seen here."""
+    missed = {}
+    for trial in self_test.trials((1e-7, 1e-6, 1e-5)):
+        if not trial.seen:
+            missed[trial.corruption.name] = max(trial.size, missed.get(trial.corruption.name, 0.0))
+    assert missed == NOT_SEEN
+
+
 HILL = self_test.SCENES["disc that slides off a disc"]
 
 

@@ -60,7 +60,7 @@ class Both:
 
 
 def pile(build):
-    """A column that stands in the floor, a disc that rolls, a box that falls; all meet."""
+    """Boxes in a column that overlaps the floor, a disc that rolls into it, and a box that falls on it."""
     return [
         build.floor(),
         build.box(0.0, 0.495, (0.3, 0.0, 0.0)),

@@ -137,7 +137,7 @@ def test_setting_that_a_case_has_already(monkeypatch):
 
 
 def test_cause_that_is_not_found_in_time(monkeypatch):
-    """What is known of the difference is told all the same."""
+    """The difference is kept even if the search for its cause has no answer."""
     ported_as(monkeypatch, Port(impratio=2.0))
     found = explained(slot("oblique"), "port", lambda ask, *case: "no answer" if case[-1] else ask(*case))
     assert found.verdict == "differs" and found.proof == ""
