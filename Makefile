@@ -143,7 +143,7 @@ releases: $(STAMP)
 
 # Ports of MuJoCo, tested beside MuJoCo C of their release, then compared with it for the page Ports; an hour of CPU.
 ports: $(STAMP)
-	$(MAKE) setup VENV=.venv-ports CONSTRAINTS= EXTRAS_OF=mujoco_warp,mujoco_mjx,mujoco_newton,dev
+	$(MAKE) setup VENV=.venv-ports CONSTRAINTS= EXTRAS_OF=mujoco-warp,mujoco-mjx,mujoco-newton,dev
 	CROSSCHECK_REQUIRE_ENGINES=mujoco_warp,mujoco_mjx,mujoco_mjx_single,mujoco_newton .venv-ports/bin/python -m pytest -m optional tests/adapters/test_ports_of_mujoco.py
 	$(BIN)/crosscheck ports mujoco --keep
 

@@ -8,6 +8,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from packaging.utils import canonicalize_name
 
 pytestmark = pytest.mark.skipif(not shutil.which("make"), reason="there is no make on this system")
 ROOT = Path(__file__).resolve().parents[2]
@@ -136,3 +137,11 @@ def test_extras_of_make_run_within_all():
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     (whole,) = extras["all"]
     assert set(USED.split(",")) < set(re.fullmatch(r"contact-crosscheck\[(.*)\]", whole)[1].split(","))
+
+
+def test_spelling_of_extras_that_pip_compares_by_letter():
+    """As pip 23 does, which Python 3.11 brings: metadata have hyphens."""
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert [name for name in extras if name != canonicalize_name(name)] == []
+    asked = re.findall(r"\.\[(.*?)\]", make("-n", "ports", "extras").stdout)
+    assert len(asked) >= 2 and {name for names in asked for name in names.split(",")} <= set(extras)
