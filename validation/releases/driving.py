@@ -296,8 +296,10 @@ def compare(
     EngineError
         If the release cannot be installed or imported.
     """
+    switches = [engine.switches for name in ports if (engine := registry.adapter(name))]
+    effort = Effort(timeout=PATIENCE * (1 + max(map(len, switches), default=0)))  # each runs a case again
     try:
-        answers = _answers(release, Effort(timeout=PATIENCE), None, [], say, ported=wanted, ports=ports)
+        answers = _answers(release, effort, None, [], say, ported=wanted, ports=ports)
         next(answers)
         for answer in answers:
             yield compared_from(answer["compared"])

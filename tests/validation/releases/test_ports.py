@@ -12,7 +12,7 @@ from adapters.stepping import posed_for, run
 from reports.ports import counts, sentence, told
 from validation.catalogue import CATALOGUE
 from validation.cells import Slot, prepare
-from validation.releases import choosing, kept
+from validation.releases import choosing, driving, kept
 from validation.releases.choosing import Release, ported
 from validation.releases.ports import LOST, ROUNDED, Compared, _asked, compared_from, explained, farthest, moved
 
@@ -272,3 +272,11 @@ def test_kept_table(monkeypatch, tmp_path):
     assert counts([row | {"proof": ""} for row in rows], "port") == "port: 1 differ with no cause found, 1 unsupported"
     assert sentence(rows[1] | {"proof": ""}).startswith("differs, no cause found: by ")
     assert sentence(rows[1]).endswith("; the same with impratio=2") and counts(rows, "other") == "other: "
+
+
+def test_silence_of_a_case_that_each_setting_runs_again(monkeypatch):
+    """All of its runs take their longest, and the case is not given up."""
+    waits = []
+    monkeypatch.setattr(driving, "_answers", lambda release, effort, *rest, **more: waits.append(effort) or iter([{}]))
+    assert list(driving.compare(Release("mujoco", "3.17.0", "mujoco", ()), ["mujoco_mjx"], [])) == []
+    assert waits[0].timeout >= driving.PATIENCE * (1 + len(registry.adapter("mujoco_mjx").switches))
