@@ -40,6 +40,7 @@ from reference_solver.certificate.audit import (
     first_without_order,
     grazes,
     joint_blows,
+    late_blows,
     shared_loads,
     slips_taken_out,
 )
@@ -125,6 +126,8 @@ class Certificate:
         Largest gap that counts as none where the run is [m].
     grazed
         (s,) way of bodies that meet or pass each other as such a gap decides [m].
+    late
+        (s,) way of bodies since blows come too late or too soon, over the gap of each.
     pose
         (s, n, 3 | 7) poses that are certified.
     """
@@ -143,6 +146,7 @@ class Certificate:
     dt: float
     gap: float
     grazed: Array = field(repr=False)
+    late: Array = field(repr=False)
     pose: Array = field(repr=False)
 
     def error_until(self, t: float) -> float:
@@ -159,7 +163,7 @@ class Certificate:
         dies out, places still add up the ways of all steps: each sum is rounded by half a unit, in each of two runs.
         Bodies touch at a gap of `GAP`, wherever they are.
         """
-        units = COORDINATE_UNITS * (1.0 + OTHER_SIGNS * self.disturbed / self.dt) + self.t / self.dt
+        units = COORDINATE_UNITS * (1.0 + OTHER_SIGNS * self.disturbed / self.dt) + self.t / self.dt + self.late
         steps = np.spacing(place) * units
         grazed = sqrt((self.gap + COORDINATE_UNITS * np.spacing(place)) / self.gap) * self.grazed
         return np.maximum.accumulate(steps + grazed + self.gap * (1.0 + np.minimum(self.growth, GROWTH)))
@@ -227,7 +231,8 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1, other
     # Bodies meet within the units in which coordinates are known, each time, and go on from there.
     assert record.pieces is not None
     met = np.searchsorted(record.pieces.begin[record.pieces.kind == IMPACT], record.t, side="right")
-    error += COORDINATE_UNITS * np.spacing(place) * (1.0 + met) * (1.0 + np.minimum(growth, GROWTH))
+    late = late_blows(model, record, settings.dt, gap)
+    error += np.spacing(place) * (COORDINATE_UNITS * (1.0 + met) + late) * (1.0 + np.minimum(growth, GROWTH))
     within = record.t < horizon
     if not np.isfinite(error[within]).all():
         reasons.append("mirrored or to another tolerance, the event loop refuses it before its end")
@@ -239,7 +244,7 @@ def certify(model: Model, settings: Settings, steps: int, stride: int = 1, other
     )
     until = _determined(model, record.t, apart, shared.limit)
     until = min(until, float(record.t[record.t < two].max()) if two < np.inf else np.inf)
-    rest = (unique, two < np.inf, moved / size, settings.dt, gap, grazed, record.pose)
+    rest = (unique, two < np.inf, moved / size, settings.dt, gap, grazed, late, record.pose)
     found = Certificate(not reasons, tuple(reasons), tuple(findings), record.t, error, growth, horizon, until, *rest)
     if found.holds:
         otherwise, rounded = _misplaced(model, settings, found, steps, stride)
@@ -300,7 +305,7 @@ def _no_run(model: Model, settings: Settings, samples: int, stride: int, why: st
     t = np.multiply(stride * settings.dt, np.arange(samples + 1), dtype=np.float64)
     none = np.full(samples + 1, np.inf)
     pose = np.full((samples + 1, len(model.bodies), POSE_SIZE[model.dimension]), np.nan)
-    made = (none, none, float("inf"), float("inf"), "", False, none, settings.dt, 0.0, none, pose)
+    made = (none, none, float("inf"), float("inf"), "", False, none, settings.dt, 0.0, none, none, pose)
     return Certificate(False, (why,), (), t, *made)
 
 

@@ -202,6 +202,20 @@ def grazes(model: Model, record: Record, dt: float, noise: float, growth: np.nda
     return moved
 
 
+def late_blows(model: Model, record: Record, dt: float, none: float) -> np.ndarray:
+    """Return how far (s,) blows of a recorded run move bodies that come too late or too soon, over the gap of each.
+
+    Rebounds no higher than ``none`` [m] have no part (`contact.late_blows`). Raises ValueError if the record has no
+    pieces.
+    """
+    moved = np.zeros(len(record.t))
+    with np.errstate(divide="ignore"):
+        blows = contact.late_blows(_run_of(model, record, dt), none)
+    for begin, change, lasts in zip(*blows, strict=True):
+        moved += change * np.clip(record.t - begin, 0.0, lasts)
+    return moved
+
+
 def joint_blows(model: Model, record: Record, dt: float, none: np.ndarray) -> np.ndarray:
     """Return how far (s,) bodies move since contacts are struck with others that are still open [m].
 

@@ -175,6 +175,18 @@ def joint_blows(run: Run, none: Array) -> tuple[Array, Array, Array]:
     return pieces.begin[several], late[several], np.array(fastest)
 
 
+def late_blows(run: Run, none: float) -> tuple[Array, Array, Array]:
+    """When (k,) contacts are struck [s], by how much loads change speeds for a gap until then [1/s], and for how long.
+
+    What closes with the speed u is struck gap / u later, and leaves so much faster, until all its rebounds are over. If
+    they rise no higher than ``none`` [m] they are summed up.
+    """
+    pieces, approach = run.pieces, -(run.meeting_velocity(after=False) * run.pieces.normal).sum(axis=1)
+    met = np.flatnonzero(run.is_impact[run.contact_owner] & (approach > math.sqrt(2.0 * run.pull * none)))
+    e, change = run.model.restitution[pieces.body_a[met], pieces.body_b[met]], 2.0 * run.pull / approach[met]
+    return pieces.begin[run.contact_owner[met]], change, 4.0 / change / (1.0 - e)
+
+
 def _held_by(run: Run, j: int, stopped: float) -> tuple[float, float]:
     """Return the acceleration [m/s^2] at which the pair of contact j is held after an impact, and its friction's share.
 

@@ -1,6 +1,7 @@
 """The error of a certificate covers gaps of the start, steps that no tolerance shortens, and all tolerances."""
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -64,3 +65,28 @@ def test_gap_that_a_fall_through_changes_nothing():
     found = certify(model, Settings.reference(1.0 / 240.0), 24)
     assert found.holds
     assert found.error[-1] < 20.0 * gap
+
+
+@pytest.mark.parametrize(
+    ("pull", "rises", "radius", "leaves", "step"),
+    [
+        (1.259755465928995, 1.2094470032036997, 0.2305946841104412, -0.0028765490977908925, 0.017777246252075912),
+        (5.081481005325863, 1.2, 0.23, 0.015465376972731, 0.0175),
+    ],
+)
+def test_many_low_rebounds_from_a_floor_that_rises(pull, rises, radius, leaves, step):
+    """Each blow finds places rounded by a last place, alike in all, which loads make a speed: 3.6e-12 m in the first.
+
+    The other one is right, and comes out otherwise far from the origin by as much as that makes there.
+    """
+    floor = Body(HalfSpace((0.0, 1.0)), motion="prescribed", twist=(0.0, rises, 0.0))
+    ball = Body(Disc(radius), 1.0, 0.5 * radius**2, (0.0, radius, 0.0), (0.0, rises + leaves, 0.0))
+    model = Model(2, [floor, ball], (0.0, -pull), 1.0, 0.0)
+    found = certify(model, Settings.reference(step), 80)
+    speed, g = abs(Fraction(rises + leaves) - Fraction(rises)), Fraction(pull)
+    truth = found.pose.copy()
+    for k, t in enumerate(map(Fraction, found.t)):
+        since = t % (2 * speed / g)
+        truth[k, 1, 1] = radius + float(Fraction(rises) * t + speed * since - g * since**2 / 2)
+    assert found.holds
+    assert (distance(model, found.pose, truth) <= found.error).all()
