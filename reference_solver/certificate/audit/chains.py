@@ -64,7 +64,8 @@ def without_order(run: Run) -> Indices:
     met = np.bincount(pair, u < -LEFT * fastest[owner]) > 0.0  # its points answer together
     drifts = ~slow & (u > 0.0) & (u <= DRIFTS * fastest[owner]) & ~loaded & ~met[pair]
     bounces = run.model.restitution[pieces.body_a, pieces.body_b] > 0.0
-    struck = np.isin(np.arange(len(owner)), pressed) & run.is_impact[owner] & np.where(bounces, left, drifts)
+    parts = met[pair] & ~run.is_chain[owner] & (u > DRIFTS * fastest[owner])
+    struck = np.isin(np.arange(len(owner)), pressed) & run.is_impact[owner] & np.where(bounces, left | parts, drifts)
     return np.flatnonzero(np.bincount(owner[struck], minlength=len(pieces)) > 0)
 
 
