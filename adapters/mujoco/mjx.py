@@ -204,6 +204,8 @@ DEEPER: Mapping[str, Mapping[str, Any]] = {
         "margin": 0.0,
         "solimp": (0.99, 0.99, 0.001, 0.5, 1.0),
     },
+    "bodies that touch may have no contacts": {"margin": -1e-5},
+    "touching bodies, and where its solver starts": {"margin": -1e-5, "disabled": ("warmstart",)},
 }
 
 

@@ -67,7 +67,7 @@ def own_kinds() -> dict[str, Check]:
     softness = {"solref": softness_of, "solimp": row(5, POSITIVE), "solreffriction": either(softness_of, None)}
     # 0 iterations solve nothing, and MuJoCo divides by impratio.
     least = {"impratio": number(1e-6, math.inf), "iterations": whole(1, LARGEST_INT)}
-    return kinds | flags | softness | least | {"margin": POSITIVE, "smooth_condim": one_of(1, 3)}
+    return kinds | flags | softness | least | {"margin": _ANY, "smooth_condim": one_of(1, 3)}
 
 
 def members_of(mujoco: Any, kind: str, prefix: str) -> dict[str, int]:

@@ -269,6 +269,16 @@ def test_gap_at_the_start_of_a_step() -> None:
             assert rows.gap[row] == pytest.approx(trajectory.pose[sample - 1, 1, 2] - 0.5, abs=1e-14)
 
 
+def test_contacts_from_an_overlap_on_with_a_margin_below_0() -> None:
+    """No force up to it, then that of the overlap beyond it."""
+
+    def speed(overlap: float, margin: float) -> float:
+        return float(drive(make(FLOOR, ball("ball", 0.5 - overlap), T=DT), "default", margin=margin).twist[1, 1, 2])
+
+    assert speed(5e-4, -1e-3) == 0.0 < 1e-3 < speed(5e-4, 0.0)
+    assert speed(1.5e-3, -1e-3) == pytest.approx(speed(5e-4, 0.0), rel=1e-9)
+
+
 def test_no_impulse_of_a_step_with_rk4() -> None:
     trajectory = drive(impact(0.5, 2.0, 0.4), "default", integrator="RK4")
     assert trajectory.contacts is not None and len(trajectory.contacts.rows.a)
@@ -498,7 +508,7 @@ def test_silent_divergence_of_an_infinite_state(tmp_path, monkeypatch, capfd) ->
         ({"iterations": 3.0}, "iterations"),
         ({"tolerance": math.nan}, "tolerance"),
         ({"impratio": 0.0}, "impratio"),
-        ({"margin": -1.0}, "margin"),
+        ({"margin": math.inf}, "margin"),
         ({"solref": (0.02,)}, "solref"),
         ({"solref": (-1.0, 1.0)}, "solref"),
         ({"solref": "stick"}, "solref"),

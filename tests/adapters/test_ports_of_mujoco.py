@@ -115,6 +115,16 @@ def test_box_in_the_margin_of_a_plane_in_mjx():
 
 
 @pytest.mark.optional("mujoco_mjx")
+@pytest.mark.parametrize(("margin", "near"), [(0.0, False), (-1e-5, True)])
+def test_boxes_that_touch_at_the_start_in_mjx(margin, near):
+    """They fall alike, so none overlaps the other; contacts of both engines begin at the same overlap of 1e-5 m."""
+    scene = posed_for(ORIGINAL, CATALOGUE["heavy_on_light"].scene(3, {}))
+    here, there = (ran(each, scene, "tuned", margin=margin) for each in (ORIGINAL, MujocoMjxEngine()))
+    apart = np.abs(here.pose - there.pose).max()
+    assert apart < 1e-9 if near else apart > 1e-4
+
+
+@pytest.mark.optional("mujoco_mjx")
 @pytest.mark.parametrize(("changes", "near"), [({}, False), ({"disabled": ("warmstart",)}, True)])
 def test_start_of_the_solver_in_mjx(changes, near):
     """From the forces of the last step it may stop far from the solution: two dominoes fly away."""
