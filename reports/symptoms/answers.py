@@ -111,6 +111,8 @@ def _of_scene(name: str, asked: Sequence[str], found: Found, source: str = "") -
     """The answer that one scene is, for some engines; without any, for those with a fix."""
     kept = table()
     scene, fixes = kept["scenes"][name], {fix["engine"]: fix for fix in kept["fixes"].get(name, ())}
+    # Newton's cradle is no question about Newton.
+    asked = [engine for engine in asked if engine not in scene["title"].lower()]
     match = next((match for match in found.matches if match.name == name), Match(name, 0.0, 0.0, 0.0, False, False, ""))
     by_engine = {engine: _of_engine(engine, name, found, fixes.get(engine)) for engine in kept["engines"]}
     return {

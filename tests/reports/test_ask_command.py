@@ -315,3 +315,8 @@ def test_question_imports_no_scenes_engines_or_numbers():
     )
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ended.stdout.startswith("pinch: ") and ended.stderr.split() == []
+
+
+def test_engine_in_the_title_of_a_scene_is_not_asked():
+    assert asked("newton", "cradle", "bullet") == asked("newtons", "cradle", "bullet")
+    assert "bullet as shipped" in asked("newton", "cradle", "bullet")
