@@ -8,7 +8,7 @@ Between two events motion is smooth. So the world goes from event to event, and 
     move      to the next event: a contact ends, bodies meet   motion, meeting, events
     record    look at the piece wherever it is asked for       world
 
-`loop` is these lines in Python. The world changes only when a piece is entered; nothing is ever put back. What the loop
+`loop` is these lines in Python. Nothing is ever put back. What the loop
 cannot tell it refuses in one sentence (`refusals`). Arrays are shaped by the dimension and the number of spins; only
 shapes, rotations and friction's cone are told for each dimension apart.
 """

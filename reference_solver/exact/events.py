@@ -35,7 +35,7 @@ MOST_ROUNDS = 1000
 class Kind(Enum):
     """What happens at the end of a piece."""
 
-    LOOK = "a step ends that may be no longer for its tolerance"
+    STEP = "a piece ends that is as long as it may be"
     SEARCH = "bodies are so near that the search for their meeting stops and goes on"
     FEATURE = "a contact comes to the end of a feature"
     SLIDE = "a slide ends"
@@ -144,7 +144,7 @@ def first_event(world: World, piece: Piece, after_instant: bool) -> Event:
 
     ``after_instant``: whether the piece before was an instant; then what is as near as round-off is not met again.
     """
-    event = Event(Kind.LOOK, 1.0)
+    event = Event(Kind.STEP, 1.0)
     if len(piece.held.contacts):
         event = _first_end(piece, Monitors(world, piece))
         piece.held.contacts.at_state(piece.start)
@@ -155,7 +155,7 @@ def first_event(world: World, piece: Piece, after_instant: bool) -> Event:
 
 
 def _first_end(piece: Piece, monitors: Monitors) -> Event:
-    event, at_start, ended, modes = Event(Kind.LOOK, 1.0), Kind.LOOK, set(), {}
+    event, at_start, ended, modes = Event(Kind.STEP, 1.0), Kind.STEP, set(), {}
     for (last, before), (now, values) in pairwise(_looks(monitors, monitors.shares())):
         for k, column in np.argwhere(values < -monitors.noise).tolist():
             kind = monitors.kind(column)
@@ -176,7 +176,7 @@ def _first_end(piece: Piece, monitors: Monitors) -> Event:
                 event = Event(kind, share, k)
         if ended or modes:
             return Event(at_start, 0.0, ended=frozenset(ended), modes=tuple(modes.items()))
-        if event.kind is not Kind.LOOK:
+        if event.kind is not Kind.STEP:
             return event
     return event
 

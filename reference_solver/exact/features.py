@@ -15,7 +15,7 @@ from reference_solver.exact.kernels.features import place_features, touching, wr
 from reference_solver.model import Array
 from reference_solver.pieces import Indices
 
-#: Features nearer than this share of the smallest half width may touch, and places as near to an end are at it (E8).
+#: Features nearer than this share of the smallest half width may touch, and places as near to an end are at it (E20).
 #: A contact that is projected has 1e-15.
 TOUCH = 1e-11
 #: Gaps of so many units in the last place of coordinates are none, beside `World.no_gap`.

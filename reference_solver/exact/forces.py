@@ -215,7 +215,7 @@ def decide(world: World, state: State, contacts: Contacts, free: Array, lasts: f
 
 
 def changed(held: Held, modes: dict[int, int], free: Array, *, strictly: bool = True) -> Held | None:
-    """Return the contacts with some modes changed, their forces nearest to those now (E38).
+    """Return the contacts with some modes changed, their forces nearest to those now (E39).
 
     None if there are no such forces, or if they break a law.
 

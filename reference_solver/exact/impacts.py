@@ -1,4 +1,4 @@
-"""Impacts: Newton's law for pairs of bodies, one after the other until nothing that touches approaches (E21)."""
+"""Impacts: Newton's law for all that approaches at once, again until nothing that touches approaches (E21)."""
 
 from __future__ import annotations
 

@@ -90,7 +90,7 @@ class Loop:
     longest: float
     pieces: int = 0
     steps: int = 0
-    ends: Kind = Kind.LOOK
+    ends: Kind = Kind.STEP
     held: Held | None = None
     left_out: frozenset[tuple[int, ...]] = frozenset()
     blows: list[Blow] = field(default_factory=list)
@@ -224,7 +224,7 @@ class Loop:
             return piece.cut(event.share), event
         length = event.share * piece.length
         shorter, _ = step(self.world, piece.start, piece.held, self._tolerance_of(piece.held), length)
-        return shorter, event if shorter.length == length else Event(Kind.LOOK, 1.0)
+        return shorter, event if shorter.length == length else Event(Kind.STEP, 1.0)
 
     def _finish(self, piece: Piece, event: Event) -> None:
         """Move the world to the end of a piece, and keep its contacts if forces do not jump there."""
@@ -241,7 +241,7 @@ class Loop:
             self.held = self._carried_on(piece.held, event)
             return
         self.next_length = None
-        if piece.held.lasts is not None and event.kind is Kind.LOOK:  # a series is over: its contacts are closed
+        if piece.held.lasts is not None and event.kind is Kind.STEP:  # a series is over: its contacts are closed
             self._project(piece.held)
 
     def _carried_on(self, held: Held, event: Event) -> Held | None:
@@ -250,7 +250,7 @@ class Loop:
         held = held.at(self.state, self._free_acceleration())
         if event.kind in GO_ON:
             return changed(held, {event.contact: GO_ON[event.kind]}, self._free_acceleration())
-        return held if event.kind in (Kind.LOOK, Kind.SEARCH) and not held.slips_end else None
+        return held if event.kind in (Kind.STEP, Kind.SEARCH) and not held.slips_end else None
 
     def _with_modes_ended(self, held: Held, event: Event) -> Held | None:
         """Return contacts with what ends as their piece begins changed; None where all is to be found anew."""
@@ -274,7 +274,7 @@ class Loop:
         self.row[what] += 1
         if self.row.total() == MOST_IN_A_ROW:
             if self.state.t - self.row_began < ROW * self.longest:
-                most = max(self.row, key=lambda each: (self.row[each], each != Kind.LOOK.value))
+                most = max(self.row, key=lambda each: (self.row[each], each != Kind.STEP.value))
                 raise NoProgress(count=MOST_IN_A_ROW, t=self.state.t, most=most)
             self.row_began = self.state.t
             self.row.clear()

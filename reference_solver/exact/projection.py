@@ -54,7 +54,7 @@ def projected(world: World, state: State, held: Held) -> tuple[State, Blow | Non
 
 
 def _at_end(held: Held) -> NDArray[np.bool_]:
-    """Whether a contact in space slips by so little that its slip is over: what begins there begins at rest (E38)."""
+    """Whether a contact in space slips by so little that its slip is over: what begins there begins at rest (E23)."""
     contacts = held.contacts
     if contacts.world.dimension == 2:
         return np.zeros(len(contacts), bool)

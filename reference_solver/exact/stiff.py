@@ -1,4 +1,4 @@
-"""Steps of motion that turns; implicit ones where a slip in space is so slow that friction turns it at once (E38).
+"""Steps of motion that turns; implicit ones where a slip in space is so slow that friction turns it at once (E23).
 
 Friction turns a slip s at the rate ``k = mu N w / |s|``, where w says how its place yields. Where s begins or ends k
 has no bound, while the motion stays smooth: the slip points where its acceleration leads. Explicit steps must resolve

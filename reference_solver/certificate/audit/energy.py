@@ -15,7 +15,7 @@ from reference_solver.model import Array
 
 #: What counts as no gap, as a share of a body: as much as the check ``apart`` lets an impulse act across.
 ACROSS = 1e-9
-#: Share of a body below which a gap is none (E8).
+#: Share of a body below which a gap is none (E20).
 NO_GAP = 1e-12
 
 
@@ -97,7 +97,7 @@ def _gains(run: Run) -> tuple[Array, np.ndarray, Array, float]:
     unseen = np.zeros(len(pieces))
     np.add.at(unseen, run.contact_owner, unseen_work)
     np.add.at(unseen, owner, unknown * np.linalg.norm(run.torque[body], axis=1))
-    # The way of a load is known to the last place of a coordinate, and to a gap that is none (E8), which may be closed.
+    # The way of a load is known to the last place of a coordinate, and to a gap that is none, which may be closed.
     known = np.spacing(np.abs(pieces.pose_after[:, : run.d])) + NO_GAP * run.extent[body][:, None]
     np.add.at(unseen, owner, np.where(free, (np.abs(run.force[body]) * known).sum(axis=1), 0.0))
     most = np.zeros(len(pieces))

@@ -118,7 +118,7 @@ def test_steps_that_take_hardly_any_time(monkeypatch):
     monkeypatch.setattr(loop, "ROW", 10.0)
     pose = (0.0, 0.0, 0.5 * np.sin(1.0) + 0.1, np.cos(0.5), 0.0, -np.sin(0.5), 0.0)
     rod = Body(Capsule(0.5, 0.1), 1.0, (0.08,) * 3, pose)
-    with pytest.raises(refusals.NoProgress, match="most often a step ends that may be no longer for its tolerance"):
+    with pytest.raises(refusals.NoProgress, match="most often a piece ends that is as long as it may be"):
         Simulation(Model(3, [GROUND, rod], (0.0, 0.0, -G), 0.0, 3.0), Settings.reference(1 / 240)).advance(240)
 
 
