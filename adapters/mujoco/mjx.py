@@ -187,19 +187,22 @@ FACTS = port_facts(
 )
 
 
-#: Causes of differences: in single precision; and in double, where also the tolerance of the solver shows, and bodies
-#: that rest less than 1e-6 m deep.
+#: Causes of differences: in single precision; of the solver in both; and in double, where also its tolerance shows, and
+#: bodies that rest less than 1e-6 m deep.
 CORNERS: Mapping[str, Mapping[str, Any]] = {
     SMOOTH: {"smooth_condim": 1},
     "corners of a box in the margin of a plane may be no contacts": {"margin": 0.0},
+}
+SOLVER: Mapping[str, Mapping[str, Any]] = {
+    "its solver ends elsewhere with friction pyramids": {"cone": "elliptic"},
+    "its solver may stop where it starts, at the forces of the last step": {"disabled": ("warmstart",)},
 }
 DEEPER: Mapping[str, Mapping[str, Any]] = {
     "its solver ends at its tolerance after another step": {"tolerance": 0.0},
     "corners of a box in the margin of a plane may be no contacts": {"margin": 0.0},
     SMOOTH: {"smooth_condim": 1, "tolerance": 0.0},
-    "its solver ends elsewhere with friction pyramids": {"cone": "elliptic"},
+    **SOLVER,
     "friction rows without friction, and pyramids": {"cone": "elliptic", "smooth_condim": 1, "tolerance": 0.0},
-    "its solver may stop where it starts, at the forces of the last step": {"disabled": ("warmstart",)},
     "bodies that rest less than 1e-6 m deep may have no contacts": {
         "margin": 0.0,
         "solimp": (0.99, 0.99, 0.001, 0.5, 1.0),
@@ -251,4 +254,4 @@ class MujocoMjxSingleEngine(MjxPort):
             for check in ("contacts", "order")
         ),
     )
-    switches = MappingProxyType({**CORNERS, **STIFF})
+    switches = MappingProxyType({**CORNERS, **STIFF, **SOLVER})

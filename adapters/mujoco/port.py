@@ -7,6 +7,7 @@ A port runs beside MuJoCo C of its own release, which compiles the model: in ano
 
 from __future__ import annotations
 
+import os
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -123,7 +124,10 @@ class PortEngine(Engine):
         found, here = version(stepped), ORIGINAL.version()
         if found.split(".")[:2] != here.split(".")[:2]:
             raise ImportError(f"{stepped} {found} is no port of MuJoCo {here}, which is installed")
+        told = set(os.environ)
         import_module(self.module)
+        for name in set(os.environ) - told:  # JAX sets two; a process in which they differ runs no second case
+            del os.environ[name]
         return version(self.facts.package)
 
     def refuses(self, scene: Scene, profile: str) -> str | None:

@@ -1,11 +1,13 @@
 """Ports of MuJoCo, each in an environment beside MuJoCo C of its release (``make ports``)."""
 
 import math
+import os
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from adapters import registry
 from adapters.conformance import items
 from adapters.engine import EngineError
 from adapters.mujoco.mjx import MujocoMjxEngine, MujocoMjxSingleEngine
@@ -18,6 +20,7 @@ from adapters.scene import Body, Box, HalfSpace, Pair, Scene, Sphere
 from adapters.stepping import posed_for, run
 from adapters.trajectory import Sampling
 from validation.catalogue import CATALOGUE
+from validation.running.apart import Apart
 
 UPRIGHT, DT = (1.0, 0.0, 0.0, 0.0), 1.0 / 240.0
 FLOOR = Body("floor", HalfSpace((0.0, 0.0, 1.0), 0.0), motion="fixed", pose=(0.0, 0.0, 0.0, *UPRIGHT))
@@ -46,6 +49,17 @@ def ran(engine, scene, profile="default", **changes):
 )
 def test_conformance(item):
     item.hold()
+
+
+@pytest.mark.parametrize("engine", PORTS)
+def test_process_that_has_imported_a_port(engine, monkeypatch):
+    """It answers again: what cells share is as before, also where JAX finds none of the variables that it sets."""
+    for name in ("TF_CPP_MIN_LOG_LEVEL", "TPU_SKIP_MDS_QUERY"):
+        monkeypatch.delenv(name, raising=False)
+    with Apart() as apart:
+        first = apart.ask(os.getpid)
+        apart.ask(registry.find, engine.name)
+        assert apart.ask(os.getpid) == first
 
 
 @pytest.mark.parametrize("engine", PORTS)
