@@ -165,6 +165,11 @@ FACTS = port_facts(
         "mujoco/mjx/_src/collision_convex.py, _create_contact_manifold; measured with 3.17.0: pinch",
     ),
     Quirk(
+        "an edge of a box on another box: its overlap is measured along a face of the edge, at an angle to the normal",
+        "unchanged: the overlap of C divided by the cosine of that angle",
+        "mujoco/mjx/_src/collision_convex.py, _create_contact_manifold; measured with 3.17.0: shove",
+    ),
+    Quirk(
         "corners of a box within the margin of a plane that do not overlap it may be no contacts",
         "unchanged; with margin=0 the box moves as in C",
         "mujoco/mjx/_src/collision_convex.py, plane_convex; measured with 3.17.0: incline",

@@ -119,6 +119,19 @@ def test_overlap_below_a_micrometre_in_mjx():
 
 
 @pytest.mark.optional("mujoco_mjx")
+@pytest.mark.parametrize("angle", [30.0, 45.0])
+def test_edge_on_a_box_in_mjx(angle):
+    """The face of the edge nearest to the normal is at an angle to it; so is the overlap that MJX measures."""
+    turn, deep = math.radians(angle), 1e-3
+    lower = Body("box", Box((0.5,) * 3), motion="fixed", pose=(0.0, 0.0, 0.5, *UPRIGHT))
+    pose = (0.0, 0.0, 1.0 + 0.2 * (math.cos(turn) + math.sin(turn)) - deep, math.cos(turn / 2), 0.0, math.sin(turn / 2))
+    upper = Body("upper", Box((0.2,) * 3), 1.0, (0.03,) * 3, (*pose, 0.0))
+    scene = replace(ball(0.3), bodies=(lower, upper), duration=DT)
+    here, there = (ran(each, scene).contacts.rows.gap for each in (ORIGINAL, MujocoMjxEngine()))
+    assert np.allclose(here, -deep) and np.allclose(there, -deep / math.cos(turn)) and len(there) == 2 * len(here) == 4
+
+
+@pytest.mark.optional("mujoco_mjx")
 def test_box_in_the_margin_of_a_plane_in_mjx():
     """No corner overlaps the plane, and not all four lowest ones are contacts."""
     for gap, corners in ((1e-4, False), (-1e-4, True)):
