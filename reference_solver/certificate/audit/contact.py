@@ -140,6 +140,7 @@ def grazes(run: Run, t: Array, pose: Array, noise: float) -> tuple[Array, Array]
         first, second = (run.model.bodies[i].shape for i in both)
         for k in range(sample[j], len(t)):
             if t[k] > until[j]:
+                met = 0.0
                 break
             gap = max(float(nearest(first, pose[k, both[0]], second, pose[k, both[1]]).gap), 0.0)
             met = math.sqrt(2.0 * APART * noise * 2.0 * gap) / (t[k] - pieces.begin[owner[j]])

@@ -90,3 +90,13 @@ def test_many_low_rebounds_from_a_floor_that_rises(pull, rises, radius, leaves, 
         truth[k, 1, 1] = radius + float(Fraction(rises) * t + speed * since - g * since**2 / 2)
     assert found.holds
     assert (distance(model, found.pose, truth) <= found.error).all()
+
+
+@pytest.mark.parametrize("sooner", [0.0, 3e-16, 1e-15, 1e-14])
+def test_ball_that_meets_the_floor_as_it_is_looked_at(sooner):
+    """It has moved by a last place when it is looked at after its blow, and has rebounded before the next look."""
+    ball = Body(Disc(0.5), 1.0, 0.125, (0.0, 0.5 + 1.25 * (1.0 - sooner), 0.0))
+    model = Model(2, [Body(HalfSpace((0.0, 1.0)), motion="fixed"), ball], (0.0, -10.0), 0.4, 0.0)
+    found = certify(model, Settings.reference(0.5), 4)
+    assert found.holds
+    assert found.error[-1] < 1e-11
