@@ -259,4 +259,11 @@ class MujocoMjxSingleEngine(MjxPort):
             for check in ("contacts", "order")
         ),
     )
-    switches = MappingProxyType({**CORNERS, **STIFF, **SOLVER})
+    switches = MappingProxyType(
+        {
+            **CORNERS,
+            **STIFF,
+            **SOLVER,
+            "friction rows without friction, and pyramids": {"cone": "elliptic", "smooth_condim": 1},
+        }
+    )
