@@ -17,6 +17,7 @@ import numpy as np
 from adapters.engine import EngineError, Expected, ProfileRule, Quirk, Recorded, Setting
 from adapters.mujoco.port import SMOOTH, STIFF, PortEngine, PortSimulation, port_facts
 from adapters.mujoco.profiles import PROFILES
+from adapters.mujoco.shipped import SOLIMP
 from adapters.mujoco.spec import Spec
 from adapters.needs import Needs
 from adapters.settings import word
@@ -265,5 +266,10 @@ class MujocoMjxSingleEngine(MjxPort):
             **STIFF,
             **SOLVER,
             "friction rows without friction, and pyramids": {"cone": "elliptic", "smooth_condim": 1},
+            "stiff contacts, and where its solver starts": {
+                "margin": 0.0,
+                "solimp": SOLIMP,
+                "disabled": ("warmstart",),
+            },
         }
     )
