@@ -132,7 +132,8 @@ def clear(bodies, course, who, s, seen, bounds):
     Of all the body, or only of the half-space of its face ``who[4]`` if that is not `ALL`.
     ``bounds``: a lift that is added to the gap, the least rate of gaps that count, T, how far to look, and the gap
     below which a half-space counts only if it holds all of the point's body as well: else the point runs along it, as
-    a corner of a box does along the side of another that stands on the same floor.
+    a corner of a box does along the side of another that stands on the same floor. Nor is it the gap, if there is a
+    lift.
     """
     d, o = seen.shape[1], who[0]
     r = bodies.radius[who[0]] + bodies.radius[who[1]]
@@ -184,12 +185,14 @@ def clear(bodies, course, who, s, seen, bounds):
             h = (h - level) / np.sqrt(near) - r
             for p in range(d):
                 n[p] /= np.sqrt(near)
+        counts = h + lift >= 0.0 and ahead > 0.0
+        if counts and h <= noise:
+            wall[:d], wall[d], wall[d + 1] = n, dot(n, seen[0]), noise + lift
+            if not holds_all(bodies, course, who, s, wall):
+                gap = max(gap, h) if lift == 0.0 else gap
+                continue
         gap = max(gap, h)
-        if h + lift >= 0.0 and ahead > 0.0:
-            if h <= noise:
-                wall[:d], wall[d], wall[d + 1] = n, dot(n, seen[0]), noise + lift
-                if not holds_all(bodies, course, who, s, wall):
-                    continue
+        if counts:
             h1, h2 = dot(n, seen[1]), dot(n, seen[2])
             if h1 > slow:
                 far = max(far, safe(h + lift, h1, h2, third, ahead))
@@ -374,18 +377,28 @@ def meeting(bodies, course, who, limits, rates, room):
     for step in range(MOST_STEPS):
         ahead = until - s
         gap, far = clear_at(bodies, course, who, s, (lift, -1e300, ahead, runs, 0.0), rates, room)
-        if step == 0 and gap <= noise:  # it touches, and leaves with a speed
-            lift, runs = max(0.0, -gap), -1e300
-            far = clear_at(bodies, course, who, s, (lift, slow, ahead, runs, noise), rates, room)[1]
-            if far == 0.0:
-                drifts = clear_at(bodies, course, who, s, (lift, -slow, ahead, runs, noise), rates, room)[1]
-                if gap > none and drifts == 0.0:  # it approaches, and meets
-                    lift, runs = 0.0, noise
-                else:  # it leaves without one: no contact until it is deeper than now by the noise
+        if step == 0 and gap <= noise:  # it touches
+            # Half-spaces that hold all of its body tell the gap, and whether it approaches, where there are any.
+            lift, far = max(0.0, -gap), 0.0
+            whole = clear_at(bodies, course, who, s, (noise + lift, -1e300, ahead, noise, 0.0), rates, room)[0]
+            holds = whole >= -noise - lift
+            if holds:
+                gap, lift = whole, max(0.0, -whole)
+                far = clear_at(bodies, course, who, s, (lift, slow, ahead, runs, noise), rates, room)[1]
+            if far == 0.0:  # a point may leave alone, over the end of a face
+                runs = -1e300
+                far = clear_at(bodies, course, who, s, (lift, slow, ahead, runs, noise), rates, room)[1]
+            if far == 0.0:  # nothing leaves with a speed
+                along = noise if holds else runs
+                drifts = clear_at(bodies, course, who, s, (lift, -slow, ahead, along, noise), rates, room)[1]
+                runs = noise if drifts == 0.0 and (holds or gap > none) else runs
+                if drifts == 0.0 and gap > none:  # it approaches, and meets
+                    lift = 0.0
+                else:  # no contact until it is deeper than now by the noise
                     lift, leaves = noise + lift, False
                 far = clear_at(bodies, course, who, s, (lift, -1e300, ahead, runs, 0.0), rates, room)[1]
-        elif not leaves and gap > noise:
-            lift, leaves = 0.0, True
+        elif gap > noise and (runs < noise or not leaves):
+            lift, leaves, runs = lift if leaves else 0.0, True, noise
             far = clear_at(bodies, course, who, s, (lift, -1e300, ahead, runs, 0.0), rates, room)[1]
         if s > 0.0 and gap + lift <= least:
             low, high = before, s

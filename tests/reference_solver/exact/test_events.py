@@ -58,6 +58,19 @@ def test_ball_that_is_drawn_back_over_an_edge(d):
     assert np.abs(energy - energy[0]).max() < 1e-8
 
 
+def test_box_that_is_drawn_back_to_a_box_as_high():
+    """Corners go along the faces beside the one that they meet: outside of those by round-off they are not clear."""
+    speed, pull, e = 0.2, 5.0, 0.5
+    back, high = 2.0 * speed / pull, (e * speed) ** 2 / (2.0 * pull)
+    for turn in np.random.default_rng(1).uniform(0.0, 6.0, 40):
+        along = np.array((math.cos(turn), math.sin(turn)))
+        post = Body(Box((0.5, 0.5)), pose=(0.0, 0.0, turn), motion="fixed")
+        box = Body(Box((0.5, 0.5)), 1.0, 1 / 6, (*along, turn), (*(speed * along), 0.0), force=tuple(-pull * along))
+        world = Simulation(Model(2, [post, box], (0.0, 0.0), e, 0.0), Settings.reference((1.0 + 0.5 * e) * back))
+        world.advance(1)
+        assert world.pose[1, :2] == pytest.approx((1.0 + high) * along, abs=1e-12)
+
+
 @pytest.mark.parametrize("turns", [1.0, 16.0, 80.0, 80.3])
 def test_table_that_turns_away_below_a_ball(turns):
     """A smooth ball rests .2 m beyond the middle of a side of a table that turns; a corner passes below it.
