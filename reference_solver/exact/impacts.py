@@ -9,7 +9,7 @@ import numpy as np
 from reference_solver.exact.bodies import State, World
 from reference_solver.exact.forces import accelerations
 from reference_solver.exact.motion import free_acceleration
-from reference_solver.exact.problem import Problem
+from reference_solver.exact.problem import NONE, ROUND_OFF, Problem
 from reference_solver.exact.record import Blow
 from reference_solver.exact.refusals import NoImpulses, NoSolution, TooManyImpacts
 from reference_solver.exact.rows import Contacts
@@ -79,11 +79,15 @@ def strike(world: World, state: State, contacts: Contacts) -> list[Blow]:
 
 
 def _struck(state: State, part: Contacts, rebounds: Array) -> Blow:
-    """Return one impact of contacts with restitutions (m,): u+ >= -e u- of each that approaches, without forces."""
+    """Return one impact of contacts with restitutions (m,): u+ >= -e u- of each that approaches, without forces.
+
+    Where speeds are differences of velocities that are far larger, they are known to the last places of those.
+    """
     free = part.rows.speed.copy()
     free[:, 0] += rebounds * np.minimum(free[:, 0], 0.0)
+    known = float((np.abs(part.matrices[0]) @ np.abs(state.velocity.ravel())).max()) * ROUND_OFF / NONE
     try:
-        impulses = Problem(part, free.ravel(), np.zeros_like(free[:, 1:])).solved(state.t).forces
+        impulses = Problem(part, free.ravel(), np.zeros_like(free[:, 1:]), known).solved(state.t).forces
     except NoSolution:
         raise NoImpulses(t=state.t) from None
     return Blow.of(state.moving(state.velocity + part.changes(impulses)), part, impulses)
