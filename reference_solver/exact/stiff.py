@@ -86,9 +86,9 @@ class Stiff(Turning):
         """Return a piece of a length [s] and the next length; None and a shorter length where that is too long."""
         start = self._state.velocity
         shape, count, k = start.shape, start.size, len(self._slips)
-        scale = self._tolerance * (
-            LEAST * self._world.speed * np.tile(self._world.per_length, len(start)) + np.abs(start.ravel())
-        )
+        each = np.tile(self._world.per_length, len(start))
+        scale = self._tolerance * (LEAST * self._world.speed * each + np.abs(start.ravel()))
+        scale_of_ways = self._tolerance * self._world.size * each
         rates = np.tile(start.ravel(), (COUNT, 1))
         accelerations = np.tile(self._start, (COUNT, 1))
         directions = np.tile(self._directions, (COUNT, 1, 1))
@@ -110,8 +110,8 @@ class Stiff(Turning):
             except np.linalg.LinAlgError:  # a slip that does not yield has no direction
                 return None, SHORTER * length
             change = rest + np.einsum("ik,ikn->in", z, turn)
-            before, changes = shift, np.array([UP_TO @ change, UP_TO @ (moved - rates)])
-            shift = length * float(np.abs(changes / scale).max())
+            before, changes = shift, np.array([UP_TO @ change / scale, UP_TO @ (moved - rates) / scale_of_ways])
+            shift = length * float(np.abs(changes).max())
             at_noise = 0.5 * before < shift < 1.0  # it no longer halves: round-off is all that still changes
             if shift < CLOSE or at_noise:
                 accelerations = now
