@@ -12,7 +12,7 @@ import numpy as np
 
 from reference_solver.certificate.audit.contact import fastest_of, reduced_mass, speeds
 from reference_solver.certificate.audit.run import Indices, Run, cross
-from reference_solver.certificate.audit.turning import alone, follow_on
+from reference_solver.certificate.audit.turning import alone, follow_on, vector_rate, way_between
 from reference_solver.certificate.audit.unexplained import Unexplained
 from reference_solver.model import Array
 
@@ -20,6 +20,8 @@ from reference_solver.model import Array
 #: is what they leave out: where all is smooth it is a hundred times that.
 PIECES, FEWER, SLACK = 6, 2, 3.0
 MIDDLE = PIECES // 2
+#: Turn of a body in space in so many pieces beyond which they tell nothing of its turns [rad].
+FAR = 1.0
 #: Share of a step below which a piece is too short to tell a rate; and of the fastest speed of the run above which a
 #: contact slips for certain.
 SHORT, SLIPS = 1e-3, 1e-9
@@ -30,17 +32,64 @@ def measured(run: Run, left: Unexplained) -> Iterator[tuple[str, float]]:
 
     Friction is mu times the load against a slip, within its cone elsewhere, and a force acts at its point.
     """
+    way, modes = _slips(run)
+    yield "rates", max(_forces(run, left, modes, way), _spins(run, left, modes))
+
+
+def ways_beside(run: Run) -> Array:
+    """How far ways and turns (m, 2) are from integrals of twists over several pieces [m], [rad]; nan where not told.
+
+    A polynomial goes through the twists between pieces, or, in space, through the rates of turns from where they begin.
+    """
+    pieces, d, count = run.pieces, run.d, np.arange(len(run.pieces.body))
+    found = np.full((len(count), 2), np.nan)
+    at = _in_a_row(run, _goes_on(run), _slips(run)[1][run.owner], run.owner, (count,))
+    if d == 3:  # rotation vectors are those of less than half a turn
+        spin = np.linalg.norm(pieces.twist_after[at][..., d:], axis=2).max(axis=1, initial=0.0)
+        at = at[spin * run.length[at].sum(axis=1) < FAR]
+    first, rate = pieces.pose_before[at[:, :1]].repeat(PIECES, axis=1), pieces.twist_after[at]
+    form, rate = rate.shape, _flat(rate)
+    way = way_between(_flat(first), _flat(pieces.pose_after[at]))
+    if d == 3:
+        rate[:, d:] = vector_rate(way[:, d:], rate[:, d:])
+    rates = np.concatenate([pieces.twist_before[at[:, :1]], rate.reshape(form)], axis=1)
+    (ends, whole), told = _ends(run.length[at]), []
+    for own in _knots():
+        power = np.arange(own.stop - own.start)
+        terms = np.linalg.solve(ends[:, own, None] ** power, rates[:, own])
+        told.append(whole[:, :, None] * np.diff(ends[:, :, None] ** (power + 1) / (power + 1) @ terms, axis=1))
+    off, unsure = np.diff(way.reshape(form), axis=1, prepend=0.0) - told[0], told[0] - told[1]
+    for out, own in enumerate((slice(0, d), slice(d, None))):
+        missed, doubt = (np.linalg.norm(each[..., own], axis=2) for each in (off, unsure))
+        missed = np.where(missed > SLACK * doubt, missed, 0.0)
+        for j in np.argsort(-np.abs(np.arange(PIECES) + 0.5 - MIDDLE)):  # those in the middle are told best
+            found[at[:, j], out] = missed[:, j]
+    return found
+
+
+def _flat(rows: Array) -> Array:
+    return rows.reshape(-1, rows.shape[-1])
+
+
+def _slips(run: Run) -> tuple[Array, Array]:
+    """Directions of slips (c, d), zeros where nothing slips, and numbers (p, 3) that tell where forces jump.
+
+    They do where a piece has other contacts than the one before it, or others of them slip.
+    """
     pieces, owner = run.pieces, run.contact_owner
     slip = run.meeting_velocity(after=False)
     slip = slip - (slip * pieces.normal).sum(axis=1)[:, None] * pieces.normal
     size = np.linalg.norm(slip, axis=1)
     slips = size > SLIPS * fastest_of(speeds(run))
     way = np.where(slips[:, None], slip, 0.0) / np.where(slips, size, 1.0)[:, None]
-    # Forces jump where a piece has other contacts, or others of them slip.
-    modes: Array = np.column_stack(
-        [np.bincount(owner, each, len(pieces)) for each in (None, slips, pieces.feature)]
-    ).astype(float)
-    yield "rates", max(_forces(run, left, modes, way), _spins(run, left, modes))
+    modes = [np.bincount(owner, each, len(pieces)) for each in (None, slips, pieces.feature)]
+    return way, np.column_stack(modes).astype(float)
+
+
+def _goes_on(run: Run) -> Sequence[Indices]:
+    """What rows of one free body share, and no others: those are no motion that goes on."""
+    body = run.pieces.body
+    return np.where(run.free[body], -1, np.arange(len(body))), body
 
 
 def _forces(run: Run, left: Unexplained, modes: Array, way: Array) -> float:
@@ -69,8 +118,7 @@ def _forces(run: Run, left: Unexplained, modes: Array, way: Array) -> float:
 
 def _spins(run: Run, left: Unexplained, modes: Array) -> float:
     pieces, body, count = run.pieces, run.pieces.body, np.arange(len(run.pieces.body))
-    identity = (np.where(run.free[body], -1, count), body)  # others are no motion that goes on
-    at = _in_a_row(run, identity, modes[run.owner], run.owner, (count,))
+    at = _in_a_row(run, _goes_on(run), modes[run.owner], run.owner, (count,))
     c, place = at[:, MIDDLE], pieces.pose_before[:, : run.d]
     linear, turning, *_ = run.pushed
     gained = run.spin[1][at] - run.spin[0][at] - run.length[at][:, :, None] * run.torque[body[at]]
@@ -115,16 +163,24 @@ def _moved(arm: Array, impulse: Array, moment: Array) -> Array:
 
 def _rate(length: Array, acting: Array) -> tuple[Array, Array]:
     """Rates (k, q) of sums as the middle one of k rows of pieces begins, and how far they may be off (k,)."""
-    ends = np.concatenate([np.zeros((len(length), 1)), length.cumsum(axis=1)], axis=1)
-    ends = (ends - ends[:, MIDDLE, None]) / ends[:, -1:]
+    ends, whole = _ends(length)
     sums = np.concatenate([np.zeros((len(length), 1, acting.shape[2])), acting.cumsum(axis=1)], axis=1)
     found = []
-    for cut in (0, FEWER // 2):
-        own = slice(cut, PIECES + 1 - cut)
-        powers = ends[:, own, None] ** np.arange(PIECES + 1 - 2 * cut)
+    for own in _knots():
+        powers = ends[:, own, None] ** np.arange(own.stop - own.start)
         found.append(np.linalg.solve(powers, sums[:, own] - sums[:, MIDDLE, None])[:, 1])
-    whole = length.sum(axis=1)[:, None]
     return found[0] / whole, SLACK * np.linalg.norm((found[0] - found[1]) / whole, axis=1)
+
+
+def _ends(length: Array) -> tuple[Array, Array]:
+    """Ends (k, PIECES + 1) of k rows of pieces, from the middle on, as shares of their whole length (k, 1) [s]."""
+    ends = np.concatenate([np.zeros((len(length), 1)), length.cumsum(axis=1)], axis=1)
+    return (ends - ends[:, MIDDLE, None]) / ends[:, -1:], ends[:, -1:]
+
+
+def _knots() -> list[slice]:
+    """Ends of pieces through which the polynomial goes, and the one of fewer."""
+    return [slice(cut, PIECES + 1 - cut) for cut in (0, FEWER // 2)]
 
 
 def _worst(missed: Array, scale: Array) -> float:

@@ -73,6 +73,8 @@ def _touching(run: Run, left: Unexplained) -> list[float]:
             sooner = float(closes_sooner(run, rows[hit], (shape_a, shape_b), at, found.gap[hit]).max())
         place = placed(pieces.point[rows], run.d)
         sides = [distinct(shape, pose, POINT, place).gap for shape, pose in ((shape_a, pose_a), (shape_b, pose_b))]
+        # Beside its place a point leaves what is round in second order only: inwards, by its radius, in first order.
+        sides += [_off_core(*own, pieces.point[rows], n) for own in ((shape_a, pose_a, -1.0), (shape_b, pose_b, 1.0))]
         beside = np.max([np.abs(side) - np.abs(found.gap) for side in sides], axis=0) - noise
         apart[rows] = (np.abs(found.gap) - noise).clip(min=0.0)
         here = ((np.abs(found.gap) - noise).max() / size, max(lost.max(), length.max(), off.max()), beside.max() / size)
@@ -106,6 +108,17 @@ def _line(found: Nearest, radius: float) -> Array:
     line = found.point_b - found.point_a + radius * found.normal
     length = np.linalg.norm(line, axis=1, keepdims=True)
     return np.asarray(np.where(length > 0.0, line / np.where(length > 0.0, length, 1.0), found.normal))
+
+
+def _off_core(shape: Any, pose: Array, sign: float, point: Array, normal: Array) -> Array:
+    """How far (s,) places a radius inside ``point``, against ``sign`` times the normal, are from the core [m]."""
+    if not (radius := _radius(shape)):
+        return np.zeros(len(point))
+    vertex, inner = core_of(shape, pose).vertex, point + sign * radius * normal
+    line = vertex[:, -1] - vertex[:, 0]
+    square = (line * line).sum(axis=1)
+    share = ((inner - vertex[:, 0]) * line).sum(axis=1) / np.where(square > 0.0, square, 1.0)
+    return np.asarray(np.linalg.norm(vertex[:, 0] + share.clip(0.0, 1.0)[:, None] * line - inner, axis=1))
 
 
 def _opened(

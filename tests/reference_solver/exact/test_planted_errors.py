@@ -165,6 +165,39 @@ def rate_of_rows(monkeypatch):
     monkeypatch.setattr(rows.Contacts, "at", wrong)
 
 
+def place_of_contact(monkeypatch):
+    """Contacts are beside their places, along the floor, by a share of the radius, and so are levers."""
+
+    def wrong(self, *state):
+        found = at(self, *state)
+        rows_of, aside = found.rows, 0.5 * SIZE
+        rows_of.place[:] += aside * rows_of.frame[:, 1]
+        for side, lever in enumerate((aside, -aside)):
+            body = found.features[:, side]
+            rows_of.row[:, 0, side, 2] += lever
+            rows_of.yields[:, 0, side, 2] += lever / found.world.bodies.moment[body, 0]
+            rows_of.speed[:, 0] += lever * state[2][body, 2]
+        return found
+
+    at = rows.Contacts.at
+    monkeypatch.setattr(rows.Contacts, "at", wrong)
+
+
+def rates_of_ways(columns):
+    """Ways in Runge-Kutta steps that are too long for their velocities, or turns for their spins."""
+
+    def plant(monkeypatch):
+        def wrong(self, *asked):
+            rate, *others = after(self, *asked)
+            rate[:, columns] *= 1.0 + SIZE
+            return rate, *others
+
+        after = motion.Turning.after
+        monkeypatch.setattr(motion.Turning, "after", wrong)
+
+    return plant
+
+
 def without_end(column):
     """An end that is not looked for: of a slide (0), of a load (1), of a feature (-1)."""
 
@@ -222,7 +255,10 @@ PLANTED = {
     "direction of a slip": (TURNS, slip_direction),
     "direction of a slip over a hill": (SUMMIT, slip_direction),
     "rate of rows": (FALLS, rate_of_rows),
+    "place of a contact": (BOUNCE, place_of_contact),
     "accelerations of a step": (FALLS, forces_of_a_step),
+    "ways of a step": (TURNS, rates_of_ways(slice(0, 3))),
+    "turns of a step": (HILL, rates_of_ways(slice(2, None))),
     "end of a slide": (SLIDES, without_end(0)),
     "end of a load": (HILL, without_end(1)),
     "end of a feature": (TABLE, without_end(-1)),
