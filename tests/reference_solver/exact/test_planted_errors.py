@@ -51,6 +51,17 @@ HILL = planar(
 TABLE = planar(
     Body(Disc(0.25), 1.0, 0.03125, (0.3, 0.75, 0.0), (1.0, 0.0, -4.0)), floor=Body(Box((0.5, 0.5)), motion="fixed")
 )
+LADDER = Model(
+    2,
+    [
+        FLOOR,
+        Body(HalfSpace((1.0, 0.0)), motion="fixed"),
+        Body(Capsule(0.5, 0.05), 1.0, 0.1, (0.05 + 0.5 * np.cos(1.1), 0.05 + 0.5 * np.sin(1.1), np.pi - 1.1)),
+    ],
+    (0.0, -G),
+    0.0,
+    0.1,
+)
 TUMBLES = spatial(
     Body(
         Box((0.3, 0.2, 0.1)),
@@ -242,6 +253,7 @@ PLANTED = {
     "friction of a slide": (SLIDES, of_world("friction", larger)),
     "friction of a slide over a hill": (HILL, of_world("friction", larger)),
     "friction of a slide in space": (TURNS, of_world("friction", larger)),
+    "friction of a ladder that slides": (LADDER, of_world("friction", larger)),
     "restitution": (BOUNCE, of_world("restitution", larger)),
     "impulse": (BOUNCE, impulse),
     "contact that is missed": (LANDS, missed_contact),
@@ -279,7 +291,7 @@ def test_planted_error_is_seen_or_covered(name, size, monkeypatch):
         assert (distance(model, found.pose, truth) <= found.error)[within].all()
 
 
-@pytest.mark.parametrize("model", [BOUNCE, LANDS, SLIDES, FALLS, HILL, TABLE, TURNS, TUMBLES, SUMMIT, GRAZE])
+@pytest.mark.parametrize("model", [BOUNCE, LANDS, SLIDES, FALLS, HILL, TABLE, LADDER, TURNS, TUMBLES, SUMMIT, GRAZE])
 def test_run_without_error_is_certified(model):
     """Errors are seen: what they are planted in is certified, to less than they are."""
     found = certify(model, Settings.reference(DT), 100)
