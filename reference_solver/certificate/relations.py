@@ -1,6 +1,6 @@
 """Changes of a world whose run must be the changed run (E72).
 
-A `Change` maps a whole world: x' = a Q x + s + V t with a turn or a mirror Q that maps axes onto axes, in other units.
+A `Change` maps a whole world: x -> l Q x + s + V t with a turn or a mirror Q that maps axes onto axes, in other units.
 A turn turns bodies with their axes; a mirror leaves body axes where they are in the mirrored world, and mirrors shapes.
 """
 

@@ -73,7 +73,7 @@ SHARES = (0.1, 10.0)
 #: Least time for which bodies fall, as a share of the world's, where it is asked what the fall through a gap changes:
 #: speeds are well above round-off then, and hardly any slip ends. What it changes is proportional to that time.
 FALL = 1e-4
-#: Steps within which what happens a little sooner or later far from the origin may be told.
+#: Samples within which what happens a little sooner or later far from the origin may be told.
 BLOCK = 5
 #: What a solve leaves of its speeds (E73), so that a run moves by a tenth of what the disturbance moves it.
 SOLVE = 1e-13
@@ -173,8 +173,8 @@ class Certificate:
 GAP, COORDINATE_UNITS = 1e-12, 10.0
 #: How many times as far as the disturbance another one of its size may move bodies: its signs are some of many.
 OTHER_SIGNS = 10.0
-#: What the end of a slip in space leaves out, as a share of the smallest half width: one below 1e-9 of a contact's
-#: reference speed, which is what loads do in a step, is taken out at once, at whatever time its step has it.
+#: What the end of a slip in space leaves out, as a share of the smallest half width: once less than 1e-11 of the
+#: world's speed is left of it, that is taken off at once (E38).
 SLIP_ENDS = 1e-11
 #: What a series of rebounds that is held may leave out, as a share of the smallest half width, until its bodies have
 #: turned by a radian (E22); and in how many steps they do, at .01 rad a step: 2.4 rad/s at 1/240 s. What it leaves out
@@ -265,7 +265,7 @@ def _open_at_start(model: Model) -> tuple[float, float]:
     """Return the largest gap that is held from the start [m], and how much faster bodies are once it has closed [m/s].
 
     With accelerations a of the contacts without a gap, bodies fall through gaps δ for T = √(2 δ/c), where c is how fast
-    a closes them, and are stopped. The run has the accelerations a' of all contacts instead: T a' of velocities.
+    a closes them, and are stopped. The run has those of all contacts instead, for as long.
     """
     world, state = world_of(replace(model, restitution=0.0)), start_of(model)
     contacts = touching_contacts(world, state)

@@ -1,10 +1,11 @@
 """Semismooth Newton method for the function F of the velocities of all bodies (E41).
 
-    F(d) = d - M^-1 J^T (Pi(z) - p),   z = p - rho (J d + u - b),   F' = 1 + M^-1 J^T Pi' rho J
+    F(y) = y - M^-1 G' (Pi(z) - p),   z = p - rho (u - b + G y),   dF/dy = 1 + M^-1 G' DPi rho G
 
-d is the change of the velocities from those that go with p. Whatever the number of contact points, there are as many
-unknowns as velocities, so that redundant points make nothing singular (P. Alart, A. Curnier, Comput. Methods Appl.
-Mech. Eng. 92, 1991). Everything is written as a change: near the solution it is small, and so is its round-off.
+y is the change of the velocities from those that go with p, DPi the derivative of Pi. Whatever the number of contact
+points, there are as many unknowns as velocities, so that redundant points make nothing singular (P. Alart, A. Curnier,
+Comput. Methods Appl. Mech. Eng. 92, 1991). Everything is written as a change: near the solution it is small, and so is
+its round-off.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ FINE = 5.0
 
 @inner_kernel
 def newton(problem: Problem, stiffness: float) -> bool:
-    """Find the root of F from d = 0; leaves Pi(z) - p in `change`. False: none found."""
+    """Find the root of F from y = 0; leaves Pi(z) - p in `change`. False: none found."""
     body = problem.body
     width = problem.size[VELOCITY_COUNT]
     for i in range(len(body)):
@@ -169,7 +170,7 @@ def set_step(problem: Problem) -> bool:
 
 @inner_kernel
 def add_contact(problem: Problem, c: int) -> None:
-    """Add M^-1 J^T Pi' rho J of one contact to the matrix."""
+    """Add M^-1 G' DPi rho G of one contact to the matrix."""
     contact, slope = problem.contact, problem.contact.slope[c]
     rows, width = problem.size[ROW_COUNT], problem.size[VELOCITY_COUNT]
     for column in range(2):

@@ -14,6 +14,6 @@ shapes, rotations and friction's cone are told for each dimension apart.
 """
 
 from reference_solver.exact.refusals import Refused
-from reference_solver.exact.world import World
+from reference_solver.exact.world import EventWorld as World
 
 __all__ = ["Refused", "World"]

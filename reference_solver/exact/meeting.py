@@ -1,12 +1,12 @@
 """When bodies meet next: points followed in the axes of the other body, as far as they stay clear of it for certain.
 
 Two convex cores that are apart meet first with a point of one on the boundary of the other, grown by both radii, or, in
-space, with two edges that cross. Seen from the other body, its *owner*, a point moves along a smooth curve rho(s). It
-is clear of the owner for as long as it is clear of one half-space ``n . rho <= c + r`` that holds the owner. Such a
-half-space stands still in these axes, however the owner turns. With h, h', h'' of the gap ``n . rho - c - r`` now, and
-T >= |rho'''| over all the piece,
+space, with two edges that cross. Seen from the other body, its *owner*, a point moves along a smooth curve c(s). It is
+clear of the owner for as long as it is clear of one half-space ``n . x <= level + r`` that holds the owner. Such a
+half-space stands still in these axes, however the owner turns. With delta, delta', delta'' of the gap ``n . c - level -
+r`` now, and c3 >= |c'''| over all the piece,
 
-    h + h' s + (h'' - T S / 3) s^2 / 2 > 0   for all s <= S    means    clear for all s <= S.
+    delta + delta' s + (delta'' - c3 S / 3) s^2 / 2 > 0   for all s <= S    means    clear for all s <= S.
 
 Both bodies are clear of each other as long as all points of one are clear of one half-space of the other. That serves
 pairs in space that may meet with their edges: of all half-spaces the one is taken that stays clear longest. Near the

@@ -1,10 +1,10 @@
 """Steps of motion that turns; implicit ones where a slip in space is so slow that friction turns it at once (E23).
 
-Friction turns a slip s at the rate ``k = mu N w / |s|``, where w says how its place yields. Where s begins or ends k
-has no bound, while the motion stays smooth: the slip points where its acceleration leads. Explicit steps must resolve
-1/k. Collocation at Radau's points need not (E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 1996,
-IV.5), if directions d of slips are unknown at each point, with the equation that s lies along d: it holds where s is
-none. Newton's method finds the directions; all else is found by repeating it.
+Friction turns a slip u_t at the rate ``kappa = mu p_n W_tt / |u_t|``, where W_tt says how its place yields. Where u_t
+begins or ends kappa has no bound, while the motion stays smooth: the slip points where its acceleration leads. Explicit
+steps must resolve 1/kappa. Collocation at Radau's points need not (E. Hairer, G. Wanner, *Solving Ordinary Differential
+Equations II*, 1996, IV.5), if directions d of slips are unknown at each point, with the equation that u_t lies along d:
+it holds where u_t is none. Newton's method finds the directions; all else is found by repeating it.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ POWERS = np.arange(COUNT)
 THROUGH = np.linalg.inv(NODES[:, None] ** POWERS)
 UP_TO = NODES[:, None] ** (POWERS + 1) / (POWERS + 1) @ THROUGH
 SERIES = np.linalg.inv(legendre.legvander(2.0 * NODES - 1.0, COUNT - 1))
-#: An explicit step is stable up to this many 1/k. Corrections below this share of the tolerance end the iteration (the
-#: same, IV.8: between .1 and .01). In so many rounds halves become a millionth; a shorter step is better than more.
+#: An explicit step is stable up to this many 1/kappa. Corrections below this share of the tolerance end the iteration
+#: (the same, IV.8: .1 to .01). In so many rounds halves become a millionth; a shorter step is better than more.
 STABLE, CLOSE, MOST = 5.0, 0.03, 20
 
 
@@ -99,7 +99,7 @@ class Stiff(Turning):
             found = [self._at(way[i].reshape(shape), velocity[i].reshape(shape), directions[i]) for i in range(COUNT)]
             moved, now, pushes, turn, slip, across = (np.array(each) for each in zip(*found, strict=True))
             rest = now - accelerations
-            # Slips are to lie along their directions: across (v + change of v) = |s| z, where z is how far they turn.
+            # Slips are to lie along their directions: across (v + change of v) = |u_t| z, z how far they turn.
             # At point i, by slip l's turn z at point j, the velocity changes by length UP_TO[i, j] turn[j, l] z.
             wanted = (slip[:, :, 1] / length + np.einsum("ikn,in->ik", across, UP_TO @ rest)).ravel()
             matrix = np.diag(slip[:, :, 0].ravel() / length) - np.einsum(

@@ -22,7 +22,7 @@ from reference_solver.step_problem import StepProblem
 LONGEST = 10.0
 
 
-class World:
+class EventWorld:
     """A model that the event loop moves; see the interface in ``simulation.py``.
 
     A run keeps the piece that it looks into, so that one that is made in parts has the same bits.

@@ -36,8 +36,8 @@ DIRECT_KEEP = 0.02
 def better_relaxation(relaxation: float, rate: float, limit: float = LARGEST_RELAXATION) -> float:
     """Factor that suits a contraction ``rate`` per sweep measured at ``relaxation`` (E13).
 
-    From Young's relation (rate + w - 1)^2 = rate w^2 mu^2 between the rate and mu, the spectral radius of the
-    Jacobi iteration, follows mu and with it the best factor. At or past the best factor the rate is w - 1 and
+    From Young's relation (rate + w - 1)^2 = rate w^2 j^2 between the rate and j, the spectral radius of the
+    Jacobi iteration, follows j and with it the best factor. At or past the best factor the rate is w - 1 and
     tells no more; a residual that grew tells nothing either.
     """
     if rate >= 1.0 or rate <= relaxation - 1.0:

@@ -1,8 +1,8 @@
 """How contacts would accelerate if no body did: points that touch wander over bodies that move, and normals turn.
 
-A contact's velocity u changes by ``J dv/dt + c``. Here is c: the rate of u while all twists stay what they are, from
-the features that touch. A feature is a corner, an edge or a face of a shape's core, as lines and planes
-without end; a ball's centre is a corner, and a capsule's axis an edge (in the plane a face).
+A contact's velocity u changes by ``G a + gamma``, with accelerations a of bodies. Here is gamma, the rate of u while
+all twists stay what they are, from the features that touch. A feature is a corner, an edge or a face of a shape's core,
+as lines and planes without end; a ball's centre is a corner, and a capsule's axis an edge (in the plane a face).
 """
 
 from __future__ import annotations

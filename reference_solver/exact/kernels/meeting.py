@@ -15,18 +15,18 @@ MOST_STEPS = 400
 
 
 @inner_kernel
-def safe(h, h1, h2, third, ahead):
+def safe(delta, delta1, delta2, third, ahead):
     """Return for how long, up to ``ahead``, a gap stays above zero for certain."""
     best = 0.0
     for _ in range(40):
-        bend = h2 - third * ahead / 3.0
-        root = 1e300  # of h + h1 s + bend s^2 / 2
-        if h1 < 0.0:
-            square = h1 * h1 - 2.0 * bend * h
+        bend = delta2 - third * ahead / 3.0
+        root = 1e300  # of delta + delta1 s + bend s^2 / 2
+        if delta1 < 0.0:
+            square = delta1 * delta1 - 2.0 * bend * delta
             if square >= 0.0:
-                root = 2.0 * h / (np.sqrt(square) - h1)
+                root = 2.0 * delta / (np.sqrt(square) - delta1)
         elif bend < 0.0:
-            root = (h1 + np.sqrt(h1 * h1 - 2.0 * bend * h)) / -bend
+            root = (delta1 + np.sqrt(delta1 * delta1 - 2.0 * bend * delta)) / -bend
         if root >= ahead:
             return max(best, ahead)
         best = max(best, root)
@@ -40,8 +40,8 @@ def safe(h, h1, h2, third, ahead):
 def write_seen(course, generator, who, point, s, seen):
     """Write a point of body ``who[1]`` in the axes of body ``who[0]``, and its first two derivatives by s (3, d).
 
-    Without the owner's turn where ``who[2]``. With rho = R' D and the owner's spin matrix W, rho' = R'(D' - W D) and
-    rho'' = R'(D'' - 2 W D' - W' D + W W D).
+    Without the owner's turn where ``who[2]``. With c = R^T D and the owner's spin matrix O, c' = R^T (D' - O D) and
+    c'' = R^T (D'' - 2 O D' - O' D + O O D).
     """
     d, q, powers = course.place.shape[1], course.way.shape[1], course.way.shape[2]
     axes, turn = np.zeros((d, d)), np.zeros(q - d)
@@ -130,7 +130,7 @@ def clear(bodies, course, who, s, seen, bounds):
     """Return the gap of a point from body ``who[0]`` grown by both radii, and how far it stays clear.
 
     Of all the body, or only of the half-space of its face ``who[4]`` if that is not `ALL`.
-    ``bounds``: a lift that is added to the gap, the least rate of gaps that count, T, how far to look, and the gap
+    ``bounds``: a lift that is added to the gap, the least rate of gaps that count, c3, how far to look, and the gap
     below which a half-space counts only if it holds all of the point's body as well: else the point runs along it, as
     a corner of a box does along the side of another that stands on the same floor. Nor is it the gap, if there is a
     lift.
@@ -145,10 +145,10 @@ def clear(bodies, course, who, s, seen, bounds):
         if who[4] != ALL and f != who[4]:
             continue
         if f < bodies.faces[o]:
-            h = -bodies.offset[o, f] - r
+            delta = -bodies.offset[o, f] - r
             for p in range(d):
                 n[p] = bodies.normal[o, f, p]
-                h += n[p] * seen[0, p]
+                delta += n[p] * seen[0, p]
         else:  # from the nearest place of the core
             if r == 0.0 or bodies.points[o] == 0:
                 continue
@@ -174,28 +174,28 @@ def clear(bodies, course, who, s, seen, bounds):
                         n[p] = seen[0, p] - bodies.point[o, i, p] - share * edge
             if near == 0.0:
                 continue
-            h, level = 0.0, -1e300
+            delta, level = 0.0, -1e300
             for k in range(bodies.points[o]):
                 reach = 0.0
                 for p in range(d):
                     reach += n[p] * bodies.point[o, k, p]
                 level = max(level, reach)
             for p in range(d):
-                h += n[p] * seen[0, p]
-            h = (h - level) / np.sqrt(near) - r
+                delta += n[p] * seen[0, p]
+            delta = (delta - level) / np.sqrt(near) - r
             for p in range(d):
                 n[p] /= np.sqrt(near)
-        counts = h + lift >= 0.0 and ahead > 0.0
-        if counts and h <= noise:
+        counts = delta + lift >= 0.0 and ahead > 0.0
+        if counts and delta <= noise:
             wall[:d], wall[d], wall[d + 1] = n, dot(n, seen[0]), noise + lift
             if not holds_all(bodies, course, who, s, wall):
-                gap = max(gap, h) if lift == 0.0 else gap
+                gap = max(gap, delta) if lift == 0.0 else gap
                 continue
-        gap = max(gap, h)
+        gap = max(gap, delta)
         if counts:
-            h1, h2 = dot(n, seen[1]), dot(n, seen[2])
-            if h1 > slow:
-                far = max(far, safe(h + lift, h1, h2, third, ahead))
+            delta1, delta2 = dot(n, seen[1]), dot(n, seen[2])
+            if delta1 > slow:
+                far = max(far, safe(delta + lift, delta1, delta2, third, ahead))
     return gap, far
 
 
@@ -223,7 +223,7 @@ def write_bounds(course, bounds):
 
 @inner_kernel
 def write_rates(bounds, o, w, arm, apart, out):
-    """Write bounds of |rho'|, |rho''|, T of a point of body w with a lever ``arm``, seen from o, ``apart`` [m]."""
+    """Write bounds of |c'|, |c''|, |c'''| of a point of body w with a lever ``arm``, seen from o, ``apart`` [m]."""
     d0 = apart + bounds[o, 0, 0] + bounds[w, 0, 0] + arm
     d1 = bounds[o, 0, 0] + bounds[w, 0, 0] + arm * bounds[w, 1, 0]
     d2 = bounds[o, 0, 1] + bounds[w, 0, 1] + arm * bounds[w, 1, 1]
@@ -301,7 +301,7 @@ def clear_of_pair(bodies, course, who, s, bounds, rates, room):
 
     ``bounds``: a lift that is added to gaps, the least rate of gaps that count, how far to look, and what touches.
     ``rates``: of points of either body (`write_rates`). Half-spaces of either body hold it. One that turns with a
-    normal n(s) leaves a point of w and one of o apart by ``n . (rho - c) - r |n|``.
+    normal n(s) leaves a point of w and one of o apart by ``n`` times their distance, less ``r |n|``.
     """
     lift, slow, ahead, touches = bounds
     seen, directions = room
@@ -337,15 +337,21 @@ def clear_of_pair(bodies, course, who, s, bounds, rates, room):
                 third += r * (6.0 * bend * turn + 12.0 * turn**3)
             for k in range(bodies.points[w]):
                 for j in range(bodies.points[o] if turns else 1):
-                    h, h1, h2 = dot(n, seen[k, 0]) - level - r + lift, dot(n, seen[k, 1]), dot(n, seen[k, 2])
+                    delta, delta1, delta2 = (
+                        dot(n, seen[k, 0]) - level - r + lift,
+                        dot(n, seen[k, 1]),
+                        dot(n, seen[k, 2]),
+                    )
                     if turns:
                         apart[:] = seen[k, 0] - bodies.point[o, j]
-                        h = dot(n, apart) - r + lift
-                        h1 += dot(n1, apart)
-                        h2 += 2.0 * dot(n1, seen[k, 1]) + 2.0 * dot(n2, apart) - r * (dot(n1, n1) + 2.0 * dot(n, n2))
+                        delta = dot(n, apart) - r + lift
+                        delta1 += dot(n1, apart)
+                        delta2 += (
+                            2.0 * dot(n1, seen[k, 1]) + 2.0 * dot(n2, apart) - r * (dot(n1, n1) + 2.0 * dot(n, n2))
+                        )
                     # What touches counts only where it leaves, but for points that are away.
-                    far = 0.0 if h <= lift + touches and h1 <= slow else far
-                    far = min(far, safe(h, h1, h2, third, far))
+                    far = 0.0 if delta <= lift + touches and delta1 <= slow else far
+                    far = min(far, safe(delta, delta1, delta2, third, far))
             best = max(best, far)
     return gap, best
 
