@@ -321,6 +321,7 @@ def _laws(run: Run, left: Unexplained) -> Iterator[float]:
     with np.errstate(invalid="ignore"):  # of no impulse times an unknown point
         off = np.linalg.norm(pieces.moment - about, axis=1) - np.where(force > 0.0, over.stray * force, 0.0)
         off -= arm * taken_out
+    left.pushed(off.clip(min=0.0) / run.size)  # on a lever that is at least as long
     yield _worst(off, arm * np.where(frozen, force, force + SOLVED * scale))
 
     yield float(np.linalg.norm(pieces.impulse, axis=1).max() / _momentum_at_hand(run))
