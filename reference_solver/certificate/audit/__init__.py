@@ -49,15 +49,15 @@ CHECKS = {
     "finite": Check(0.0, "a state or an impulse is no number"),
     # Pieces hand over the very numbers.
     "joined": Check(0.0, "bodies do not go on where they were"),
-    # What is left of a step below 1e-14 of it is dropped, once a step.
+    # Begins and lengths are rounded once each.
     "time": Check(1e-12, "pieces do not fill the time"),
-    # Solves leave 1e-13 of their speeds and gather round-off with every sweep: 2e-11 (`certificate.GATES`), thrice.
+    # Velocities are integrals of the forces. Where contacts share loads impulses are by Gauss' rule: off by 5e-11.
     "momentum": Check(1e-10, "impulses and loads do not explain a change of momentum"),
-    # As momentum, and the quadrature of a phase of fifth order: (w h)^6 of a body that turns .03 rad in a piece.
+    # As momentum, and moments of a piece that turns are by Gauss' rule: (w h)^6 of a body that turns .03 rad in it.
     "spin": Check(1e-9, "moments and torques do not explain a change of angular momentum"),
     # Free flight is a parabola, to round-off, as a share of the body.
     "flight": Check(1e-12, "a body in free flight leaves its parabola"),
-    # What a push out of an overlap moves in one piece: a thousandth of the overlap that is allowed.
+    # Ways and velocities within a step are interpolated each by itself, to its tolerance: off by 1e-10.
     "path": Check(1e-9, "a body's way is not that of its velocity"),
     # The independent integration is exact to 1e-10 of a turn of .3 rad.
     "turn": Check(1e-9, "a body that nothing touches does not turn by Euler's equations"),
@@ -97,7 +97,7 @@ CHECKS = {
     "start": Check(1e-6, "bodies overlap at the start"),
     # Two motions are one while they differ by no more than bodies may overlap at the start.
     "shared": Check(1e-6, "the motion is not determined"),
-    # Energies are squares of momenta; a phase of fifth order gains or loses with the sixth power of its step.
+    # Energies are squares of momenta; a piece that turns gains or loses what its step leaves: 5e-11 where bodies rock.
     "gained": Check(1e-9, "energy was gained"),
     # As much as may be gained.
     "lost": Check(1e-9, "energy was lost that friction does not take"),

@@ -126,7 +126,7 @@ def _turn(run: Run) -> tuple[Array, Array]:
     """Turn (m, 1 | 3) about fixed axes, the integral of the spin, and what is unknown (m,) of it [rad].
 
     A constant torque works by it. Where nothing pushes, or with an even force, angular momentum changes evenly and
-    Euler's equations tell the spin (`integrated_turn`). In a phase of fifth order forces change, by what no record
+    Euler's equations tell the spin (`integrated_turn`). In a piece that turns forces change, by what no record
     says; but the body has turned by the rotation vector psi, and by Magnus' series (W. Magnus, Commun. Pure Appl. Math.
     7, 1954) the integral of the spin is ``psi + h^2 (w_0 x w_1)/12`` but for the fifth order. With a_k the terms of
     Taylor's series of the spin about the middle, times h, that is ``-([a_1, a_4]/120 + [a_3, a_2]/60 + [[a_1, a_2],

@@ -152,9 +152,9 @@ def _spin(run: Run, left: Unexplained) -> float:
 def _path(run: Run, left: Unexplained, beside: Array) -> Iterator[tuple[str, float]]:
     """Ways of free bodies against their velocities: those nothing touches, and those something touches.
 
-    With constant acceleration the way is the mean velocity times the time. In a phase of fifth order the velocity
-    bends: by no more than what it changes, times the angle by which bodies turn in the piece. Several such pieces tell
-    more: how far ``beside`` (m,) a way is from its velocities there [m].
+    With constant acceleration the way is the mean velocity times the time. In a piece that turns the velocity bends: by
+    no more than what it changes, times the angle by which bodies turn in the piece. Several such pieces tell more: how
+    far ``beside`` (m,) a way is from its velocities there [m].
     """
     pieces, body, length = run.pieces, run.pieces.body, run.length
     last = pieces.twist_after[:, : run.d]
@@ -177,7 +177,7 @@ def _path(run: Run, left: Unexplained, beside: Array) -> Iterator[tuple[str, flo
 
 
 def _bend(run: Run) -> Array:
-    """How far a path of a phase of fifth order may lie off the mean velocity times the time (m,) [m]."""
+    """How far a path of a piece that turns may lie off the mean velocity times the time (m,) [m]."""
     body = run.pieces.body
     acting = run.pushed[2] + run.length * np.linalg.norm(run.force[body], axis=1)
     return np.asarray(0.5 * run.length * acting / run.mass[body] * np.minimum(swings(run)[run.owner], 1.0))

@@ -155,7 +155,7 @@ class Run:
 
     @cached_property
     def is_frozen(self) -> NDArray[np.bool_]:
-        """(p,) whether rows of the contacts stood still in a piece: all but phases of fifth order."""
+        """(p,) whether rows of the contacts stood still in a piece: all but those that turn."""
         return np.asarray((self.pieces.length == 0.0) | (self.pieces.scheme != TURNING))
 
     @cached_property

@@ -21,7 +21,7 @@ from reference_solver.model import Array
 SLACK = 0.25
 #: Largest error of a normal that the geometry tells anew with which it counts as the one that was used.
 SAME = 1e-6
-#: Share of an impulse by which a phase of fifth order, whose stages obey the laws, may miss them.
+#: Share of an impulse by which a piece that turns, whose stages obey the laws, may miss them.
 SOLVED = 1e-8
 #: Change of a force as a share of it where no neighbour in time tells: it may end, or begin.
 UNKNOWN_CHANGE = 2.0
