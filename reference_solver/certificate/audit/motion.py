@@ -168,7 +168,7 @@ def _path(run: Run, left: Unexplained, beside: Array) -> Iterator[tuple[str, flo
     touched = _touched(run)
     noise = 8.0 * np.spacing(np.abs(pieces.pose_before[:, : run.d]).max(axis=1, initial=0.0))
     defect = np.maximum(defect - bend - noise - 4.0 * np.spacing(length * np.linalg.norm(mean, axis=1)), 0.0)
-    defect = np.where(np.isfinite(beside), beside, defect)
+    defect = np.fmax(defect, beside)
     size = np.where(np.isfinite(run.extent), run.extent, 1.0)[body]
     left.went(defect)
     share = np.where(run.free[body], defect / size, 0.0)
@@ -241,7 +241,7 @@ def _turn(run: Run, left: Unexplained, beside: Array) -> float:
         turn = pieces.pose_after[rows, 2] - pieces.pose_before[rows, 2]
         noise = 8.0 * np.spacing(np.abs(pieces.pose_after[rows, 2])) + bend
         off = np.maximum(np.abs(turn - length * mean) - noise, 0.0)
-        off = np.where(np.isfinite(beside[rows]), beside[rows], off)
+        off = np.fmax(off, beside[rows])
         left.went(arm * off, rows)
         return float(off.max())
     q, _ = turned_by_momentum(run, rows)
@@ -249,7 +249,7 @@ def _turn(run: Run, left: Unexplained, beside: Array) -> float:
     off = 2.0 * np.linalg.norm(q * np.sign(dot)[:, None] - pieces.pose_after[rows, 3:], axis=1)
     whole = np.linalg.norm(pieces.pose_after[rows, 3:], axis=1)
     off = np.where(np.abs(dot) > 0.5 * whole, np.maximum(off - bend, 0.0), np.pi)
-    off = np.where(np.isfinite(beside[rows]), beside[rows], off)
+    off = np.fmax(off, beside[rows])
     left.went(arm * off, rows)
     return float(off.max())
 

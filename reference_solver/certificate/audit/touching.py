@@ -111,7 +111,7 @@ def _line(found: Nearest, radius: float) -> Array:
 
 
 def _off_core(shape: Any, pose: Array, sign: float, point: Array, normal: Array) -> Array:
-    """How far (s,) places a radius inside ``point``, against ``sign`` times the normal, are from the core [m]."""
+    """How far (s,) places a radius from ``point``, along ``sign`` times the normal, are from the core [m]."""
     if not (radius := _radius(shape)):
         return np.zeros(len(point))
     vertex, inner = core_of(shape, pose).vertex, point + sign * radius * normal
