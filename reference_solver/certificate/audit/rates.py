@@ -16,8 +16,9 @@ from reference_solver.certificate.audit.turning import alone, follow_on, vector_
 from reference_solver.certificate.audit.unexplained import Unexplained
 from reference_solver.model import Array
 
-#: Pieces through whose ends a polynomial goes; another one has one fewer. What both differ by, so many times, is what
-#: they leave out: where all is smooth it is ten times that. With two fewer, forces that miss by 1e-8 would be below it.
+#: Pieces through whose ends a polynomial goes; two others have one fewer, the first or the last. What they differ by,
+#: so many times, is what they leave out: where all is smooth it is ten times that. With two fewer, forces that miss by
+#: 1e-8 would be below it; ways are told well enough.
 PIECES, SLACK = 6, 3.0
 MIDDLE = PIECES // 2
 #: Turn of a body in space in so many pieces beyond which they tell nothing of its turns [rad].
@@ -54,14 +55,14 @@ def ways_beside(run: Run) -> Array:
         rate[:, d:] = vector_rate(way[:, d:], rate[:, d:])
     rates = np.concatenate([pieces.twist_before[at[:, :1]], rate.reshape(form)], axis=1)
     (ends, whole), told = _ends(run.length[at]), []
-    for own in _knots():
-        power = np.arange(own.stop)
+    for own in (*_knots(), slice(1, PIECES)):
+        power = np.arange(len(range(PIECES + 1)[own]))
         terms = np.linalg.solve(ends[:, own, None] ** power, rates[:, own])
         told.append(whole[:, :, None] * np.diff(ends[:, :, None] ** (power + 1) / (power + 1) @ terms, axis=1))
-    off, unsure = np.diff(way.reshape(form), axis=1, prepend=0.0) - told[0], told[0] - told[1]
+    off = np.array([np.diff(way.reshape(form), axis=1, prepend=0.0), *told[1:]]) - told[0]
     for out, own in enumerate((slice(0, d), slice(d, None))):
-        missed, doubt = (np.linalg.norm(each[..., own], axis=2) for each in (off, unsure))
-        missed = np.where(missed > SLACK * doubt, missed, 0.0)
+        missed, *unsure = np.linalg.norm(off[..., own], axis=3)
+        missed = np.where(missed > SLACK * np.max(unsure, axis=0), missed, 0.0)
         for j in np.argsort(-np.abs(np.arange(PIECES) + 0.5 - MIDDLE)):  # those in the middle are told best
             found[at[:, j], out] = missed[:, j]
     return found
@@ -167,9 +168,10 @@ def _rate(length: Array, acting: Array) -> tuple[Array, Array]:
     sums = np.concatenate([np.zeros((len(length), 1, acting.shape[2])), acting.cumsum(axis=1)], axis=1)
     found = []
     for own in _knots():
-        powers = ends[:, own, None] ** np.arange(own.stop)
-        found.append(np.linalg.solve(powers, sums[:, own] - sums[:, MIDDLE, None])[:, 1])
-    return found[0] / whole, SLACK * np.linalg.norm((found[0] - found[1]) / whole, axis=1)
+        powers = ends[:, own, None] ** np.arange(len(range(PIECES + 1)[own]))
+        found.append(np.linalg.solve(powers, sums[:, own] - sums[:, MIDDLE, None])[:, 1] / whole)
+    unsure = np.maximum(*(np.linalg.norm(each - found[0], axis=1) for each in found[1:]))
+    return found[0], SLACK * unsure
 
 
 def _ends(length: Array) -> tuple[Array, Array]:
@@ -179,8 +181,8 @@ def _ends(length: Array) -> tuple[Array, Array]:
 
 
 def _knots() -> list[slice]:
-    """Ends of pieces through which the polynomial goes, and the other one."""
-    return [slice(PIECES + 1), slice(PIECES)]
+    """Ends of pieces through which the polynomial goes, and the others."""
+    return [slice(PIECES + 1), slice(PIECES), slice(1, PIECES + 1)]
 
 
 def _worst(missed: Array, scale: Array) -> float:
