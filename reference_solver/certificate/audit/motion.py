@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_solver.certificate.audit.rates import ways_beside
 from reference_solver.certificate.audit.run import Run, cross, twist_of
 from reference_solver.certificate.audit.turning import changes_of_force
 from reference_solver.certificate.audit.unexplained import Unexplained
@@ -32,9 +31,8 @@ def measured(run: Run, pose: Array, record: Record, left: Unexplained) -> Iterat
     yield "time", _time(run)
     yield "momentum", _momentum(run, left)
     yield "spin", _spin(run, left)
-    beside = ways_beside(run)
-    yield from _path(run, left, beside[:, 0])
-    yield "turn", _turn(run, left, beside[:, 1])
+    yield from _path(run, left)
+    yield "turn", _turn(run, left)
     yield "prescribed", _prescribed(run, pose, end)
 
 
@@ -149,12 +147,11 @@ def _spin(run: Run, left: Unexplained) -> float:
     return _worst(np.maximum(defect, 0.0), scale, run.free[body])
 
 
-def _path(run: Run, left: Unexplained, beside: Array) -> Iterator[tuple[str, float]]:
+def _path(run: Run, left: Unexplained) -> Iterator[tuple[str, float]]:
     """Ways of free bodies against their velocities: those nothing touches, and those something touches.
 
-    With constant acceleration the way is the mean velocity times the time. In a piece that turns the velocity bends: by
-    no more than what it changes, times the angle by which bodies turn in the piece. Several such pieces tell more: how
-    far ``beside`` (m,) a way is from its velocities there [m].
+    With constant acceleration the way is the mean velocity times the time. In a piece that turns the velocity
+    bends: by no more than what it changes, times the angle by which bodies turn in the piece.
     """
     pieces, body, length = run.pieces, run.pieces.body, run.length
     last = pieces.twist_after[:, : run.d]
@@ -168,7 +165,6 @@ def _path(run: Run, left: Unexplained, beside: Array) -> Iterator[tuple[str, flo
     touched = _touched(run)
     noise = 8.0 * np.spacing(np.abs(pieces.pose_before[:, : run.d]).max(axis=1, initial=0.0))
     defect = np.maximum(defect - bend - noise - 4.0 * np.spacing(length * np.linalg.norm(mean, axis=1)), 0.0)
-    defect = np.fmax(defect, beside)
     size = np.where(np.isfinite(run.extent), run.extent, 1.0)[body]
     left.went(defect)
     share = np.where(run.free[body], defect / size, 0.0)
@@ -214,11 +210,11 @@ def turned_by(run: Run) -> Array:
     return angle
 
 
-def _turn(run: Run, left: Unexplained, beside: Array) -> float:
+def _turn(run: Run, left: Unexplained) -> float:
     """Orientations of free bodies against their spins, in space by Euler's equations [rad].
 
-    Torques are constant where rows stand still; where they turn, spins bend as paths do, and turns are ``beside`` (m,)
-    as ways are. Sums of low rebounds are not asked.
+    Torques are constant where rows stand still; where they turn, spins bend as paths do. Sums of low rebounds are not
+    asked.
     """
     pieces, owner = run.pieces, run.owner
     rows = np.flatnonzero(run.free[pieces.body] & (run.length > 0.0) & ~run.is_rocking[owner])
@@ -241,7 +237,6 @@ def _turn(run: Run, left: Unexplained, beside: Array) -> float:
         turn = pieces.pose_after[rows, 2] - pieces.pose_before[rows, 2]
         noise = 8.0 * np.spacing(np.abs(pieces.pose_after[rows, 2])) + bend
         off = np.maximum(np.abs(turn - length * mean) - noise, 0.0)
-        off = np.fmax(off, beside[rows])
         left.went(arm * off, rows)
         return float(off.max())
     q, _ = turned_by_momentum(run, rows)
@@ -249,7 +244,6 @@ def _turn(run: Run, left: Unexplained, beside: Array) -> float:
     off = 2.0 * np.linalg.norm(q * np.sign(dot)[:, None] - pieces.pose_after[rows, 3:], axis=1)
     whole = np.linalg.norm(pieces.pose_after[rows, 3:], axis=1)
     off = np.where(np.abs(dot) > 0.5 * whole, np.maximum(off - bend, 0.0), np.pi)
-    off = np.fmax(off, beside[rows])
     left.went(arm * off, rows)
     return float(off.max())
 

@@ -34,17 +34,19 @@ def measured(run: Run, left: Unexplained) -> Iterator[tuple[str, float]]:
     Friction is mu times the load against a slip, within its cone elsewhere, and a force acts at its point.
     """
     way, modes = _slips(run)
+    left.went(_beside(run, modes))
     yield "rates", max(_forces(run, left, modes, way), _spins(run, left, modes))
 
 
-def ways_beside(run: Run) -> Array:
-    """How far ways and turns (m, 2) are from integrals of twists over several pieces [m], [rad]; nan where not told.
+def _beside(run: Run, modes: Array) -> Array:
+    """How far (m,) any point is from where the integrals of twists over several pieces lead, at most [m].
 
     A polynomial goes through the twists between pieces, or, in space, through the rates of turns from where they begin.
+    Steps to a coarse tolerance leave more of that than any fault that is looked for: it has no limit.
     """
     pieces, d, count = run.pieces, run.d, np.arange(len(run.pieces.body))
-    found = np.full((len(count), 2), np.nan)
-    at = _in_a_row(run, _goes_on(run), _slips(run)[1][run.owner], run.owner, (count,))
+    found = np.zeros((len(count), 2))
+    at = _in_a_row(run, _goes_on(run), modes[run.owner], run.owner, (count,))
     if d == 3:  # rotation vectors are those of less than half a turn
         spin = np.linalg.norm(pieces.twist_after[at][..., d:], axis=2).max(axis=1, initial=0.0)
         at = at[spin * run.length[at].sum(axis=1) < FAR]
@@ -65,7 +67,8 @@ def ways_beside(run: Run) -> Array:
         missed = np.where(missed > SLACK * np.max(unsure, axis=0), missed, 0.0)
         for j in np.argsort(-np.abs(np.arange(PIECES) + 0.5 - MIDDLE)):  # those in the middle are told best
             found[at[:, j], out] = missed[:, j]
-    return found
+    arm = np.where(run.free, run.reach, 0.0)[pieces.body]
+    return np.asarray(found[:, 0] + arm * found[:, 1])
 
 
 def _flat(rows: Array) -> Array:
