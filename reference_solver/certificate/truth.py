@@ -281,7 +281,7 @@ def _open_at_start(model: Model) -> tuple[float, float]:
     except Refused:
         open_ones = free
     closing = -contacts.at_state(state.moving(open_ones)).rows.speed[:, 0]
-    falls = (gaps > 0.0) & (closing > ROUND_OFF * world.weight)
+    falls = (gaps > 0.0) & (closing > ROUND_OFF * world.pull)
     if not falls.any():
         return float(gaps.max()), 0.0
     time = float(np.sqrt(2.0 * gaps[falls] / closing[falls]).max())

@@ -135,10 +135,10 @@ class World:
         (n, n).
     extent, size
         Half widths of the bodies (n,), and the smallest of them [m].
-    weight
+    pull
         Largest acceleration by loads [m/s^2], also of points at a distance of ``size`` from the centre of a body that
         they turn. Without loads, v^2 / ``size`` with the largest speed v at the start; 1 if nothing moves.
-    load
+    least_weight
         What the lightest body weighs [N].
     """
 
@@ -148,18 +148,18 @@ class World:
     friction: Array
     extent: Array
     size: float
-    weight: float
-    load: float
+    pull: float
+    least_weight: float
 
     @cached_property
     def time(self) -> float:
         """Time in which a body falls through half of ``size`` [s]."""
-        return math.sqrt(self.size / self.weight)
+        return math.sqrt(self.size / self.pull)
 
     @cached_property
     def speed(self) -> float:
         """Speed that is reached by then [m/s]."""
-        return math.sqrt(self.size * self.weight)
+        return math.sqrt(self.size * self.pull)
 
     @cached_property
     def per_length(self) -> Array:
@@ -256,12 +256,12 @@ def world_of(model: Model) -> World:
     )
     twist = np.abs(start_of(model).velocity)
     fastest = max(float(twist[:, :d].max()), size * float(twist[:, d:].max()))
-    weight = max(float(np.abs(load[:, :d]).max()), size * float(np.abs(torque / moment).max()))
-    weight = weight or fastest**2 / size or 1.0
+    pull = max(float(np.abs(load[:, :d]).max()), size * float(np.abs(torque / moment).max()))
+    pull = pull or fastest**2 / size or 1.0
     lightest = min((body.mass for body in model.bodies if body.motion == "free"), default=0.0)
     shapes = tuple(body.shape for body in model.bodies)
     return World(
-        bodies, shapes, np.array(model.restitution), np.array(model.friction), extent, size, weight, lightest * weight
+        bodies, shapes, np.array(model.restitution), np.array(model.friction), extent, size, pull, lightest * pull
     )
 
 

@@ -97,7 +97,7 @@ class Monitors:
         self.noise = np.full((len(modes), self.width + 3), MARGIN * world.size)
         self.noise[:, self.width] = world.still
         self.noise[:, self.width + 1 :] = NONE * (
-            LEAST * world.load + np.abs(self._answer.forces[:, :1]).max(initial=0.0)
+            LEAST * world.least_weight + np.abs(self._answer.forces[:, :1]).max(initial=0.0)
         )
 
     def __call__(self, share: float) -> Array:

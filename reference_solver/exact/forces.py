@@ -161,7 +161,7 @@ class Held:
         """Contacts of all groups and where each begins, how changes of redundant forces are weighed, and `UNEVEN`."""
         groups = self.contacts.groups
         ends = np.concatenate(groups), np.cumsum([0, *map(len, groups)])
-        uneven = bool(self.pressure.max() > UNEVEN * self.contacts.world.weight)
+        uneven = bool(self.pressure.max() > UNEVEN * self.contacts.world.pull)
         return ends, loads_shared(self.contacts, self.answer.forces), uneven
 
 
@@ -209,7 +209,7 @@ def decide(world: World, state: State, contacts: Contacts, free: Array, lasts: f
         contacts.at_state(state)
         directions = np.where(slips[:, None], np.array([1.0, 0.0]), 0.0)
     rates = accelerations(contacts, free) + (0.0 if lasts is None else contacts.rows.speed.ravel() / lasts)
-    if np.abs(rates).max() < ROUND_OFF * world.weight:
+    if np.abs(rates).max() < ROUND_OFF * world.pull:
         rates[:] = 0.0
     return replace(held_by(contacts, Problem(contacts, rates, directions).solved(state.t), free), lasts=lasts)
 
@@ -245,8 +245,8 @@ def changed(held: Held, modes: dict[int, int], free: Array, *, strictly: bool = 
     now_held.slipped = held.slipped | {contacts.names[k] for k, mode in modes.items() if mode == SLIP}
     after = (problem.rows @ (problem.yields @ found.forces.ravel()) + problem.free).reshape(found.forces.shape)
     force, load = np.abs(found.forces).max(), found.forces[:, 0]
-    least = -NONE * (LEAST * contacts.world.load + force)
-    small = -NONE * (contacts.world.weight + np.abs(after).max())
+    least = -NONE * (LEAST * contacts.world.least_weight + force)
+    small = -NONE * (contacts.world.pull + np.abs(after).max())
     friction = np.linalg.norm(found.forces[:, 1:], axis=1)
     holds = load.min() >= least and after[:, 0].min() >= small
     holds &= not ((now == STICK) & (friction > contacts.friction * load - least)).any()

@@ -66,7 +66,7 @@ def strike(world: World, state: State, contacts: Contacts) -> list[Blow]:
             blow = _struck(state, part, rebounds)
         except NoImpulses:
             # A wedge cannot rebound from both sides at once; to and fro it can, and ends at rest where that is low.
-            high = fastest[-1] ** 2 > 2.0 * world.weight * height(world, state)
+            high = fastest[-1] ** 2 > 2.0 * world.pull * height(world, state)
             if high or not rebounds.any():
                 raise
             stopped[pair[which]] = True

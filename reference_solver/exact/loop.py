@@ -80,7 +80,7 @@ class Loop:
         Of the next step to the tolerance [s]; None where a closed form is tried first.
     after_instant
         Whether the piece before was an instant, see `PROGRESS`.
-    row, row_began
+    recent, recent_began
         The last events, up to `MOST_IN_A_ROW`, by what happened, and when they began [s].
     """
 
@@ -96,8 +96,8 @@ class Loop:
     blows: list[Blow] = field(default_factory=list)
     next_length: float | None = None
     after_instant: bool = False
-    row: Counter[str] = field(default_factory=Counter)
-    row_began: float = 0.0
+    recent: Counter[str] = field(default_factory=Counter)
+    recent_began: float = 0.0
 
     def next_piece(self) -> tuple[list[Blow], Piece]:
         """Return what strikes bodies now and the motion up to the next event, and move the world to its end.
@@ -271,10 +271,10 @@ class Loop:
 
     def _count(self, what: str) -> None:
         """Count an event, and refuse where time hardly goes on."""
-        self.row[what] += 1
-        if self.row.total() == MOST_IN_A_ROW:
-            if self.state.t - self.row_began < ROW * self.longest:
-                most = max(self.row, key=lambda each: (self.row[each], each != Kind.STEP.value))
+        self.recent[what] += 1
+        if self.recent.total() == MOST_IN_A_ROW:
+            if self.state.t - self.recent_began < ROW * self.longest:
+                most = max(self.recent, key=lambda each: (self.recent[each], each != Kind.STEP.value))
                 raise NoProgress(count=MOST_IN_A_ROW, t=self.state.t, most=most)
-            self.row_began = self.state.t
-            self.row.clear()
+            self.recent_began = self.state.t
+            self.recent.clear()

@@ -143,7 +143,7 @@ def constant(world: World, state: State, held: Held, length: float) -> Piece | N
     if not len(held.contacts):
         return piece
     rows = held.contacts.rows
-    if np.abs(rows.rate).max() > STEADY * world.weight or not _slips_straight(held):
+    if np.abs(rows.rate).max() > STEADY * world.pull or not _slips_straight(held):
         return None
     before, contacts = rows.yields.copy(), held.contacts
     turns = False
@@ -160,7 +160,7 @@ def _slips_straight(held: Held) -> bool:
     rubs = (answer.modes == SLIP) & (contacts.friction > 0.0)
     change = accelerations(contacts, held.acceleration).reshape(answer.forces.shape)[:, 1:]
     along = (change * answer.directions).sum(axis=1, keepdims=True)
-    return not (np.abs(change - along * answer.directions).max(axis=1)[rubs] > REST * contacts.world.weight).any()
+    return not (np.abs(change - along * answer.directions).max(axis=1)[rubs] > REST * contacts.world.pull).any()
 
 
 def _turns_steadily(world: World, state: State, acceleration: Array) -> bool:
