@@ -103,8 +103,8 @@ class Certificate:
     t
         (s,) times of the samples [s].
     error
-        (s,) bound of the distance between the run and any exact motion: of any point of any free body, for its finite
-        step, round-off, and loads that the laws do not determine [m].
+        (s,) bound of the distance between the run and any exact motion: of any point of any free body, for its
+        tolerance, round-off, and loads that the laws do not determine [m].
     growth
         (s,) of a disturbance, over what it is in free flight for the time of the run; the largest so far.
     horizon
@@ -121,7 +121,7 @@ class Certificate:
     disturbed
         (s,) way that the disturbance moves a body, over its speed [s].
     dt
-        Step [s].
+        Time between two looks [s].
     gap
         Largest gap that counts as none where the run is [m].
     grazed
@@ -174,7 +174,7 @@ GAP, COORDINATE_UNITS = 1e-12, 10.0
 #: How many times as far as the disturbance another one of its size may move bodies: its signs are some of many.
 OTHER_SIGNS = 10.0
 #: What the end of a slip in space leaves out, as a share of the smallest half width: once less than 1e-11 of the
-#: world's speed is left of it, that is taken off at once (E38).
+#: world's speed is left of it, that is taken off at once (E23).
 SLIP_ENDS = 1e-11
 #: What a series of rebounds that is held may leave out, as a share of the smallest half width, until its bodies have
 #: turned by a radian (E22); and in how many steps they do, at .01 rad a step: 2.4 rad/s at 1/240 s. What it leaves out
