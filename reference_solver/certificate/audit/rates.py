@@ -12,7 +12,7 @@ import numpy as np
 
 from reference_solver.certificate.audit.contact import fastest_of, reduced_mass, speeds
 from reference_solver.certificate.audit.run import Indices, Run, cross
-from reference_solver.certificate.audit.turning import alone, follow_on, vector_rate, way_between
+from reference_solver.certificate.audit.turning import follow_on, vector_rate, way_between
 from reference_solver.certificate.audit.unexplained import Unexplained
 from reference_solver.model import Array
 
@@ -97,27 +97,38 @@ def _goes_on(run: Run) -> Sequence[Indices]:
 
 
 def _forces(run: Run, left: Unexplained, modes: Array, way: Array) -> float:
-    pieces, owner, n, d = run.pieces, run.contact_owner, run.pieces.normal, run.d
-    slips, length = np.asarray(way.any(axis=1)), run.pieces.length[run.contact_owner]
+    pieces, d = run.pieces, run.d
+    # Points of a pair share its load in a way that the record knows less well: their sum is asked, and no moment. The
+    # law holds for it as far as their normals and slips are those of the first.
+    keys = np.column_stack([pieces.body_a, pieces.body_b, run.contact_owner])
+    _, first, pair, points = np.unique(keys, axis=0, return_index=True, return_inverse=True, return_counts=True)
+    a, b, owner = keys[first].T
+    impulse, unlike = np.zeros((len(first), d)), np.zeros(len(first))
+    np.add.at(impulse, pair.ravel(), pieces.impulse)
+    both = np.column_stack([pieces.normal, way])
+    np.maximum.at(unlike, pair.ravel(), np.abs(both - both[first][pair.ravel()]).sum(axis=1))
+    n, way, length = pieces.normal[first], way[first], pieces.length[owner]
+    slips = np.asarray(way.any(axis=1))
     turned = np.sign(cross(n, way))[:, 0] if d == 2 else slips
-    # Points of a pair share its load in a way that the record knows less well: they are not asked.
-    shares = np.where(alone(owner, pieces.body_a * len(run.free) + pieces.body_b), -1, np.arange(len(owner)))
-    identity = shares, pieces.feature, pieces.body_b, pieces.body_a
     state = np.column_stack([slips, turned, modes[owner]])
-    at = _in_a_row(run, identity, state, owner, run.side)
+    at = _in_a_row(run, (pieces.feature[first], b, a), state, owner, [each[first] for each in run.side])
     c = at[:, MIDDLE]
     # Moments about the point there, whose round-off is none of the distance from the origin.
-    moment = _moved(-pieces.point[c][:, None], pieces.impulse[at], pieces.moment[at]) / run.size
-    rate, unsure = _rate(length[at], np.concatenate([pieces.impulse[at], moment], axis=2))
-    force, mu = rate[:, :d], run.model.friction[pieces.body_a, pieces.body_b][c]
+    moment = _moved(-pieces.point[first][c][:, None], impulse[at], pieces.moment[first][at]) / run.size
+    moment *= (points == 1)[c][:, None, None]
+    rate, unsure = _rate(length[at], np.concatenate([impulse[at], moment], axis=2))
+    force, mu = rate[:, :d], run.model.friction[a, b][c]
     load = (force * n[c]).sum(axis=1)
     limit = mu * load.clip(min=0.0)
     along = force - load[:, None] * n[c] + limit[:, None] * way[c]
     missed = np.linalg.norm(along, axis=1) - np.where(slips[c], 0.0, limit)
     missed = np.maximum(missed, np.linalg.norm(rate[:, d:], axis=1))
-    missed = np.where(missed > unsure, missed, 0.0)
-    left.pushed(_lasting(at, missed, length))
-    return _worst(missed, np.linalg.norm(force, axis=1) + reduced_mass(run)[c] * run.pull)
+    acting = np.linalg.norm(force, axis=1)
+    missed = np.where(missed > unsure + unlike[c] * acting, missed, 0.0)
+    found = np.zeros(len(pair))
+    found[first] = _lasting(at, missed, length)
+    left.pushed(found)
+    return _worst(missed, acting + reduced_mass(run)[first][c] * run.pull)
 
 
 def _spins(run: Run, left: Unexplained, modes: Array) -> float:

@@ -78,6 +78,10 @@ SUMMIT = spatial(
     friction=0.2,
     floor=Body(Sphere(1.0), motion="fixed", pose=(0.0, 0.0, 0.0, *UPRIGHT)),
 )
+ROD = spatial(
+    Body(Capsule(0.3, 0.1), 1.0, (0.01, 0.04, 0.04), (0.0, 0.0, 0.1, *UPRIGHT), (0.0, 1.0, 0.0, 0.0, 0.0, 0.0)),
+    friction=0.2,
+)
 TURNS = spatial(Body(Sphere(0.5), 1.0, (0.1,) * 3, (0.0, 0.0, 0.5, *UPRIGHT), (1.0, 0.5, 0.0, 2.0, 0.0, 1.0)), 0.0, 0.1)
 
 
@@ -263,6 +267,7 @@ PLANTED = {
     "friction of a slide over a hill": (HILL, of_world("friction", larger)),
     "friction of a slide in space": (TURNS, of_world("friction", larger)),
     "friction of a ladder that slides": (LADDER, of_world("friction", larger)),
+    "friction of a rod that lies and slips": (ROD, of_world("friction", larger)),
     "restitution": (BOUNCE, of_world("restitution", larger)),
     "impulse": (BOUNCE, impulse),
     "contact that is missed": (LANDS, missed_contact),
@@ -275,6 +280,7 @@ PLANTED = {
     "time of an impact": (BOUNCE, late_impact),
     "direction of a slip": (TURNS, slip_direction),
     "direction of a slip over a hill": (SUMMIT, slip_direction),
+    "direction of a slip of a rod that lies": (ROD, slip_direction),
     "rate of rows": (FALLS, rate_of_rows),
     "place of a contact": (BOUNCE, lever(recorded=True)),
     "lever of a contact far from the origin": (FAR, lever(recorded=False)),
@@ -302,7 +308,7 @@ def test_planted_error_is_seen_or_covered(name, size, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "model", [BOUNCE, FAR, LANDS, SLIDES, FALLS, HILL, TABLE, LADDER, TURNS, TUMBLES, SUMMIT, GRAZE]
+    "model", [BOUNCE, FAR, LANDS, SLIDES, FALLS, HILL, TABLE, LADDER, ROD, TURNS, TUMBLES, SUMMIT, GRAZE]
 )
 def test_run_without_error_is_certified(model):
     """Errors are seen: what they are planted in is certified, to less than they are."""
