@@ -109,8 +109,7 @@ def _forces(run: Run, left: Unexplained, modes: Array, way: Array) -> float:
     np.maximum.at(unlike, pair.ravel(), np.abs(both - both[first][pair.ravel()]).sum(axis=1))
     n, way, length = pieces.normal[first], way[first], pieces.length[owner]
     slips = np.asarray(way.any(axis=1))
-    turned = np.sign(cross(n, way))[:, 0] if d == 2 else slips
-    state = np.column_stack([slips, turned, modes[owner]])
+    state = np.column_stack([slips, np.sign(cross(n, way))[:, 0] if d == 2 else slips, modes[owner]])
     at = _in_a_row(run, (pieces.feature[first], b, a), state, owner, [each[first] for each in run.side])
     c = at[:, MIDDLE]
     # Moments about the point there, whose round-off is none of the distance from the origin.
@@ -125,9 +124,7 @@ def _forces(run: Run, left: Unexplained, modes: Array, way: Array) -> float:
     missed = np.maximum(missed, np.linalg.norm(rate[:, d:], axis=1))
     acting = np.linalg.norm(force, axis=1)
     missed = np.where(missed > unsure + unlike[c] * acting, missed, 0.0)
-    found = np.zeros(len(pair))
-    found[first] = _lasting(at, missed, length)
-    left.pushed(found)
+    left.pushed(np.bincount(first, _lasting(at, missed, length), len(pair)))
     return _worst(missed, acting + reduced_mass(run)[first][c] * run.pull)
 
 
