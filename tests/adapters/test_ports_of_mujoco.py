@@ -146,7 +146,8 @@ def test_box_in_the_margin_of_a_plane_in_mjx():
 def test_boxes_that_touch_at_the_start_in_mjx(margin, near):
     """They fall alike, so none overlaps the other; contacts of both engines begin at the same overlap of 1e-5 m."""
     scene = posed_for(ORIGINAL, CATALOGUE["heavy_on_light"].scene(3, {}))
-    here, there = (ran(each, scene, "tuned", margin=margin) for each in (ORIGINAL, MujocoMjxEngine()))
+    changes = {"margin": margin, "disabled": ("warmstart",)}  # where its solver starts is another cause
+    here, there = (ran(each, scene, "tuned", **changes) for each in (ORIGINAL, MujocoMjxEngine()))
     apart = np.abs(here.pose - there.pose).max()
     assert apart < 1e-9 if near else apart > 1e-4
 
