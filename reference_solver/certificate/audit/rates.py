@@ -124,7 +124,7 @@ def _forces(run: Run, left: Unexplained, modes: Array, way: Array) -> float:
     missed = np.maximum(missed, np.linalg.norm(rate[:, d:], axis=1))
     acting = np.linalg.norm(force, axis=1)
     missed = np.where(missed > unsure + unlike[c] * acting, missed, 0.0)
-    left.pushed(np.bincount(first, _lasting(at, missed, length), len(pair)))
+    left.pushed(np.bincount(first, _lasting(at, missed, length), len(pair)).astype(float))
     return _worst(missed, acting + reduced_mass(run)[first][c] * run.pull)
 
 
