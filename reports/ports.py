@@ -102,13 +102,16 @@ def told(rows: Sequence[Row]) -> dict[str, Any]:
     cases: dict[str, dict[str, str]] = {}
     for row in rows:
         cases.setdefault(case_of(row), {})[row["port"]] = sentence(row)
+    numbers = {kind: [tally(rows, port)[kind] for port in ports] for kind in KINDS}
+    numbers["not run"] = [sum(port not in cells for cells in cases.values()) for port in ports]
     return {
         "releases": " and ".join(sorted({row["release"] for row in rows})),
         "ports": ports,
         "precisions": [known.precision if (known := registry.facts(port)) else "" for port in ports],
         "causes": causes(rows, ports),
-        "counts": [(kind, [str(tally(rows, port)[kind] or "") for port in ports]) for kind in KINDS]
-        + [("not run", [str(sum(port not in cells for cells in cases.values()) or "") for port in ports])],
+        "counts": [
+            (kind, [str(count or "") for count in counted]) for kind, counted in numbers.items() if any(counted)
+        ],
         "cases": [(case, [cells.get(port, "not run") for port in ports]) for case, cells in sorted(cases.items())],
         "moves": MOVES,
         "rounded": ROUNDED,
