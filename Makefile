@@ -141,7 +141,7 @@ releases: $(STAMP)
 	$(BIN)/python -m reports.releases $(RELEASES_OUT) $(RELEASES_OUT)/releases.md
 	cp $(RELEASES_OUT)/releases.html $(RELEASES_OUT)/releases.md reports/published/
 
-# Ports of MuJoCo, tested beside MuJoCo C of their release, then compared with it for the page Ports; an hour of CPU.
+# Ports of MuJoCo, tested beside MuJoCo C of their release, then compared with it for the page Ports; hours of CPU.
 ports: $(STAMP)
 	$(MAKE) setup VENV=.venv-ports CONSTRAINTS= EXTRAS_OF=mujoco-warp,mujoco-mjx,mujoco-newton,dev
 	CROSSCHECK_REQUIRE_ENGINES=mujoco_warp,mujoco_mjx,mujoco_mjx_single,mujoco_newton .venv-ports/bin/python -m pytest -m optional tests/adapters/test_ports_of_mujoco.py

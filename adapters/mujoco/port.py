@@ -126,7 +126,7 @@ class PortEngine(Engine):
             raise ImportError(f"{stepped} {found} is no port of MuJoCo {here}, which is installed")
         told = set(os.environ)
         import_module(self.module)
-        for name in set(os.environ) - told:  # JAX sets two; a process in which they differ runs no second case
+        for name in set(os.environ) - told:  # JAX sets two, and a process whose variables change runs no second case
             del os.environ[name]
         return version(self.facts.package)
 

@@ -8,9 +8,9 @@ Between two events motion is smooth. So the world goes from event to event, and 
     move      to the next event: a contact ends, bodies meet   motion, meeting, events
     record    look at the piece wherever it is asked for       world
 
-`loop` is these lines in Python. Nothing is ever put back. What the loop
-cannot tell it refuses in one sentence (`refusals`). Arrays are shaped by the dimension and the number of spins; only
-shapes, rotations and friction's cone are told for each dimension apart.
+`loop` is these lines in Python. Nothing is ever put back. What the loop cannot tell it refuses in one sentence
+(`refusals`). Arrays are shaped by the dimension and the number of spins; only shapes, rotations and friction's cone are
+written for each dimension.
 """
 
 from reference_solver.exact.refusals import Refused

@@ -79,9 +79,9 @@ def strike(world: World, state: State, contacts: Contacts) -> list[Blow]:
 
 
 def _struck(state: State, part: Contacts, rebounds: Array) -> Blow:
-    """Return one impact of contacts with restitutions (m,): u+ >= -e u- of each that approaches, without forces.
+    """Return one impact of contacts with restitutions e (m,): those that approach with u- leave with u+ >= -e u-.
 
-    Where speeds are differences of velocities that are far larger, they are known to the last places of those.
+    Loads do nothing in it. A speed of contact is a difference of velocities, and known to the last places of those.
     """
     free = part.rows.speed.copy()
     free[:, 0] += rebounds * np.minimum(free[:, 0], 0.0)

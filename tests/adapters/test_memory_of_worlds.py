@@ -15,7 +15,7 @@ from adapters.conformance.finding import NotAsked
 MEGABYTE = 2**20
 
 
-def test_memory_growth_measured_four_times_and_only_where_available(toy, monkeypatch):
+def test_memory_that_grows_in_four_rounds(toy, monkeypatch):
     """Pools come and go; what leaks does so each time."""
 
     def growth(grown):

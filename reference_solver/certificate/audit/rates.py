@@ -16,12 +16,13 @@ from reference_solver.certificate.audit.turning import follow_on, vector_rate, w
 from reference_solver.certificate.audit.unexplained import Unexplained
 from reference_solver.model import Array
 
-#: Pieces through whose ends a polynomial goes; two others have one fewer, the first or the last. What they differ by,
-#: so many times, is what they leave out: where all is smooth it is ten times that. With two fewer, forces that miss by
-#: 1e-8 would be below it; ways are told well enough.
+#: Pieces through whose ends a polynomial goes. Two others leave out the first end, or the last. Its error is taken as
+#: `SLACK` times the largest difference from these, ten times what it is in smooth motion. If two ends were left out,
+#: forces that are wrong by 1e-8 would be within that.
 PIECES, SLACK = 6, 3.0
 MIDDLE = PIECES // 2
-#: Turn of a body in space in so many pieces beyond which they tell nothing of its turns [rad].
+#: Largest turn of a body in space in `PIECES` of which turns are compared: rates of rotation vectors grow without bound
+#: towards a whole turn [rad].
 FAR = 1.0
 #: Share of a step below which a piece is too short to tell a rate; and of the fastest speed of the run above which a
 #: contact slips for certain.
@@ -39,10 +40,10 @@ def measured(run: Run, left: Unexplained) -> Iterator[tuple[str, float]]:
 
 
 def _beside(run: Run, modes: Array) -> Array:
-    """How far (m,) any point is from where the integrals of twists over several pieces lead, at most [m].
+    """Bound (m,) of how far points are from where the integrals of twists over several pieces lead [m].
 
-    A polynomial goes through the twists between pieces, or, in space, through the rates of turns from where they begin.
-    Steps to a coarse tolerance leave more of that than any fault that is looked for: it has no limit.
+    A polynomial goes through the twists between pieces; in space, through the rates of rotation vectors. This distance
+    has no limit: steps to a coarse tolerance make it large in runs that are right.
     """
     pieces, d, count = run.pieces, run.d, np.arange(len(run.pieces.body))
     found = np.zeros((len(count), 2))
@@ -65,7 +66,7 @@ def _beside(run: Run, modes: Array) -> Array:
     for out, own in enumerate((slice(0, d), slice(d, None))):
         missed, *unsure = np.linalg.norm(off[..., own], axis=3)
         missed = np.where(missed > SLACK * np.max(unsure, axis=0), missed, 0.0)
-        for j in np.argsort(-np.abs(np.arange(PIECES) + 0.5 - MIDDLE)):  # those in the middle are told best
+        for j in np.argsort(-np.abs(np.arange(PIECES) + 0.5 - MIDDLE)):  # the middle last: errors are least there
             found[at[:, j], out] = missed[:, j]
     arm = np.where(run.free, run.reach, 0.0)[pieces.body]
     return np.asarray(found[:, 0] + arm * found[:, 1])
@@ -100,13 +101,13 @@ def _forces(run: Run, left: Unexplained, modes: Array, way: Array) -> float:
     pieces, d = run.pieces, run.d
     # Points of a pair share its load in a way that the record knows less well: their sum is asked, and no moment. The
     # law holds for it as far as their normals and slips are those of the first.
-    keys = np.column_stack([pieces.body_a, pieces.body_b, run.contact_owner])
-    _, first, pair, points = np.unique(keys, axis=0, return_index=True, return_inverse=True, return_counts=True)
-    a, b, owner = keys[first].T
+    keys = (pieces.body_a * len(run.free) + pieces.body_b) * len(pieces) + run.contact_owner
+    _, first, pair, points = np.unique(keys, return_index=True, return_inverse=True, return_counts=True)
+    a, b, owner = pieces.body_a[first], pieces.body_b[first], run.contact_owner[first]
     impulse, unlike = np.zeros((len(first), d)), np.zeros(len(first))
-    np.add.at(impulse, pair.ravel(), pieces.impulse)
+    np.add.at(impulse, pair, pieces.impulse)
     both = np.column_stack([pieces.normal, way])
-    np.maximum.at(unlike, pair.ravel(), np.abs(both - both[first][pair.ravel()]).sum(axis=1))
+    np.maximum.at(unlike, pair, np.abs(both - both[first][pair]).sum(axis=1))
     n, way, length = pieces.normal[first], way[first], pieces.length[owner]
     slips = np.asarray(way.any(axis=1))
     state = np.column_stack([slips, np.sign(cross(n, way))[:, 0] if d == 2 else slips, modes[owner]])
