@@ -175,22 +175,23 @@ def seen_by(model: Model, record: Record) -> tuple[str, ...]:
     return tuple(finding.name for finding in audit(model, record, DT) if not finding.holds)
 
 
-def in_error(model: Model, record: Record, right: Record) -> tuple[str, ...]:
+def in_error(scene: Scene, model: Model, record: Record) -> tuple[str, ...]:
     """`IN_X` where X contains what a corruption moves: twice what the audit leaves unexplained."""
     _, moved = audited(model, record, DT)
-    return IN_X if (distance(model, record.pose, right.pose) <= 2.0 * moved).all() else ()
+    return IN_X if (distance(model, record.pose, run(scene)[1].pose) <= 2.0 * moved).all() else ()
 
 
-def trials(sizes: tuple[float, ...] = SIZES, every: int = 1) -> Iterator[Trial]:
-    """Plant the corruptions one at a time, at all sizes; ``every`` n-th of them only."""
-    for corruption in CORRUPTIONS[::every]:
+def trials(sizes: tuple[float, ...] = SIZES, first: int = 0, every: int = 1) -> Iterator[Trial]:
+    """Plant the corruptions one at a time, at all sizes: from the ``first`` on every n-th."""
+    for corruption in CORRUPTIONS[first::every]:
+        scene = SCENES[corruption.scene]
         for size in sizes:
             try:
-                planted = corruption.plant(SCENES[corruption.scene], size)
+                model, record = corruption.plant(scene, size)
             except Refused:  # the loop notices it by itself
                 yield Trial(corruption, size, ("refused",))
                 continue
-            yield Trial(corruption, size, seen_by(*planted) or in_error(*planted, run(SCENES[corruption.scene])[1]))
+            yield Trial(corruption, size, seen_by(model, record) or in_error(scene, model, record))
 
 
 def gates() -> Iterator[Gate]:
